@@ -1,0 +1,1 @@
+"""Policies, the planner among them, on one footing."""

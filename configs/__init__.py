@@ -1,0 +1,1 @@
+"""Strict settings and the shipped YAML files and demonstrations."""

@@ -1,0 +1,1 @@
+"""Screw-theoretic planning and control; knows no simulator and no Gymnasium."""

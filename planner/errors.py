@@ -1,0 +1,96 @@
+"""Every error of the project: one line for the reader, the offending data for the caller."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+
+def _allowed(names: Iterable[Any]) -> str:
+    """Name what is allowed, for the end of a message."""
+    return ", ".join(str(name) for name in names)
+
+
+class OneDemoError(Exception):
+    """Root of all errors that a caller may want to catch; its text is one clear line."""
+
+
+class NotUnit(OneDemoError, ValueError):
+    """A quaternion or dual quaternion is not of unit norm."""
+
+    def __init__(self, what: str, norm: float):
+        self.what, self.norm = what, norm
+        super().__init__(f"{what} has norm {norm:.9g}; expected 1 (normalize it first)")
+
+
+class BadShape(OneDemoError, ValueError):
+    """An array has the wrong shape."""
+
+    def __init__(self, what: str, shape: tuple[int, ...], expected: str):
+        self.what, self.shape, self.expected = what, shape, expected
+        super().__init__(f"{what} has shape {shape}; expected {expected}")
+
+
+class NotFinite(OneDemoError, ValueError):
+    """An array holds NaN or infinity."""
+
+    def __init__(self, what: str, index: Any):
+        self.what, self.index = what, index
+        super().__init__(f"{what} holds a value that is not finite at index {index}")
+
+
+class BadDemonstration(OneDemoError, ValueError):
+    """A demonstration, or the file it comes from, cannot be used."""
+
+    def __init__(self, path: str | Path | None, key: str, reason: str):
+        self.path, self.key, self.reason = path, key, reason
+        super().__init__(f"{path or 'demonstration'}: {key}: {reason}")
+
+
+class BadConfig(OneDemoError, ValueError):
+    """A configuration file or an override on the command line cannot be used."""
+
+    def __init__(self, source: str | Path, key: str, reason: str):
+        self.source, self.key, self.reason = source, key, reason
+        super().__init__(f"{source}: {key}: {reason}" if key else f"{source}: {reason}")
+
+
+class BadModel(OneDemoError, ValueError):
+    """A robot model (URDF, MJCF, compiled) has no such arm, or holds absurd numbers."""
+
+    def __init__(self, source: str | Path, what: str, reason: str):
+        self.source, self.what, self.reason = source, what, reason
+        super().__init__(f"{source}: {what}: {reason}")
+
+
+class UnknownName(OneDemoError, ValueError):
+    """A name (robot, level, option, policy, task) that is not among the known ones."""
+
+    def __init__(self, kind: str, name: object, known: Iterable[object]):
+        self.kind, self.name, self.known = kind, name, tuple(known)
+        super().__init__(f"unknown {kind} {name!r}; known: {_allowed(self.known)}")
+
+
+class BadOption(OneDemoError, ValueError):
+    """An environment option has a value that cannot be used."""
+
+    def __init__(self, option: str, reason: str):
+        self.option, self.reason = option, reason
+        super().__init__(f"option {option!r}: {reason}")
+
+
+class BadAction(OneDemoError, ValueError):
+    """An action has the wrong shape or is not finite."""
+
+    def __init__(self, reason: str):
+        self.reason = reason
+        super().__init__(f"action: {reason}")
+
+
+class PlanFailed(OneDemoError):
+    """No plan was found; `reason` says why in the words of the failure taxonomy."""
+
+    def __init__(self, reason: str, detail: str):
+        self.reason, self.detail = reason, detail
+        super().__init__(f"{reason}: {detail}")

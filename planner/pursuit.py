@@ -1,0 +1,186 @@
+"""Following a path with a kinematic arm, one tick at a time or as a whole roll-out (Algorithm 1, corrected).
+
+The reference is the pose `path[index]`; it advances only while the tcp is within the capture radius, never
+goes back, and stays at the last pose until that is reached. (The paper advances it every tick and stops when
+it runs out, which ends far from the goal.) With the log law the pull to a reference that is far away moves
+along one screw: that is the blend.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import screw
+from .arm import Arm
+from .chain import body_jacobian, forward
+from .controller import FRAMES, ControllerSettings, choose_sign, joint_velocity, workspace
+from .errors import BadOption
+from .jit import kernel
+from .pose import PosePath
+
+METERS_PER_RADIAN = 0.2
+PROGRESS = 1e-4
+"""Screw length [m] that counts as progress."""
+FOLLOWING, ARRIVED, STALLED = 0, 1, 2
+INDEX, SIGN, BEST, WAITED = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True)
+class PursuitSettings:
+    """How a path is followed.
+
+    Attributes:
+        tau: fraction of the screw to the reference that is aimed at in a tick; scales the gain.
+            The paper's 0.01 belongs to a 1 kHz loop.
+        capture_radius: screw length [m] to the reference at which it advances.
+        position_tolerance: arrival [m].
+        angle_tolerance: arrival [rad].
+        patience: seconds without progress after which it has stalled.
+        rule: "capture" as above, or "paper": the reference advances every tick.
+    """
+
+    tau: float = 1.0
+    capture_radius: float = 0.010
+    position_tolerance: float = 0.001
+    angle_tolerance: float = 0.01
+    patience: float = 3.0
+    rule: str = "capture"
+
+    def __post_init__(self):
+        if not 0 < self.tau <= 1:
+            raise BadOption("tau", f"{self.tau} is not in (0, 1]")
+        if self.rule not in ("capture", "paper"):
+            raise BadOption("rule", f"{self.rule!r} is not one of capture, paper")
+        for name in ("capture_radius", "position_tolerance", "angle_tolerance", "patience"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
+
+    def packed(self) -> tuple[float, ...]:
+        """The settings as the kernels take them."""
+        tolerances = (self.position_tolerance, self.angle_tolerance)
+        return (self.tau, self.capture_radius, *tolerances, self.patience, float(self.rule == "paper"))
+
+
+class RollOut(NamedTuple):
+    """A path followed by the kinematic arm.
+
+    Attributes:
+        arrived: the last pose was reached within tolerance.
+        reason: "" or why not: "ik_or_limit" (no progress) or "timeout".
+        q: (dof,) joints at the end.
+        seconds: duration.
+        margin: smallest distance of a joint to its limit on the way [rad].
+        trace: (ticks + 1, dof) joints on the way.
+    """
+
+    arrived: bool
+    reason: str
+    q: np.ndarray
+    seconds: float
+    margin: float
+    trace: np.ndarray
+
+
+@kernel
+def pursue(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot):
+    """One tick along the path (n, 8): joint speeds into `qdot`, the state of the pursuit in `memory` (4,)."""
+    tau, radius, position_tolerance, angle_tolerance, patience, every_tick = pursuit
+    frames = work[FRAMES : FRAMES + 16]
+    x = forward(chain, q, frames)
+    body_jacobian(chain, x, frames, work)
+    before = int(memory[INDEX])
+    index, last = before, len(path) - 1
+    left = 0.0
+    while True:
+        distance, angle = screw.gap(x, screw.load8(path, index))
+        left = math.hypot(distance, METERS_PER_RADIAN * angle)
+        if index == last or every_tick == 1.0 or left > radius:
+            break
+        index += 1
+    if every_tick == 1.0 and index < last:
+        index += 1
+    memory[INDEX] = index
+    for i in range(len(q)):
+        qdot[i] = 0.0
+    if index == last and distance <= position_tolerance and angle <= angle_tolerance:
+        return ARRIVED
+    if index > before or left < memory[BEST] - PROGRESS:
+        memory[BEST], memory[WAITED] = left, 0.0
+    else:
+        memory[WAITED] += dt
+        if memory[WAITED] > patience:
+            return STALLED
+    error = screw.mul(screw.conj(x), screw.load8(path, index))
+    memory[SIGN] = choose_sign(error, memory[SIGN])
+    if memory[SIGN] < 0.0:
+        error = screw.neg(error)
+    if tau < 1.0:
+        error = screw.from_twist(screw.scaled(screw.twist_along(error), tau))
+    joint_velocity(limits, q, error, controller, work, qdot)
+    return FOLLOWING
+
+
+@kernel
+def _roll_out(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot, trace):
+    """Follow the whole path from q, which is moved along; status, ticks, smallest joint margin."""
+    margin = np.inf
+    for count in range(len(trace)):
+        for i in range(len(q)):
+            trace[count, i] = q[i]
+            margin = min(margin, q[i] - limits[0, i], limits[1, i] - q[i])
+        status = pursue(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot)
+        if status != FOLLOWING:
+            return status, count, margin
+        for i in range(len(q)):
+            q[i] += dt * qdot[i]
+    return FOLLOWING, len(trace) - 1, margin
+
+
+class Pursuit:
+    """A path being followed by an arm, tick by tick, on joints that the caller integrates or measures."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        path: PosePath,
+        dt: float,
+        *,
+        controller: ControllerSettings | None = None,
+        settings: PursuitSettings | None = None,
+    ):
+        self.arm, self.path, self.dt = arm, path, dt
+        controller = controller or ControllerSettings()
+        if not 0 < controller.gain * dt <= 1:
+            raise BadOption("gain", f"gain * dt = {controller.gain * dt:g} is not in (0, 1]")
+        self._settings = controller.packed(), (settings or PursuitSettings()).packed()
+        self._limits = arm.limits
+        self._memory = np.array([0.0, 0.0, np.inf, 0.0])
+        self._work = workspace()
+
+    @property
+    def index(self) -> int:
+        """Index of the reference in the path."""
+        return int(self._memory[INDEX])
+
+    def step(self, q: ArrayLike) -> tuple[int, np.ndarray]:
+        """Status (FOLLOWING, ARRIVED or STALLED) and joint speeds (dof,) at joints q (dof,)."""
+        qdot = np.empty(self.arm.dof)
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        path = self.path.dqs
+        shared = (*self._settings, self._memory, self._work, qdot)
+        return pursue(self.arm.chain, self._limits, path, q, self.dt, *shared), qdot
+
+    def roll_out(self, q: ArrayLike, max_seconds: float = 60.0) -> RollOut:
+        """Follow the path to its end with ideal tracking, from its beginning; the pursuit itself is unchanged."""
+        q = np.array(q, dtype=np.float64)
+        trace = np.empty((round(max_seconds / self.dt) + 1, self.arm.dof))
+        memory = np.array([0.0, 0.0, np.inf, 0.0])
+        shared = (*self._settings, memory, self._work, np.empty(self.arm.dof), trace)
+        status, ticks, margin = _roll_out(self.arm.chain, self._limits, self.path.dqs, q, self.dt, *shared)
+        reason = {ARRIVED: "", STALLED: "ik_or_limit", FOLLOWING: "timeout"}[status]
+        return RollOut(status == ARRIVED, reason, q, ticks * self.dt, margin, trace[: ticks + 1])

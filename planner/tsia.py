@@ -1,0 +1,137 @@
+"""Task-space imitation (TSIA): one demonstrated path carried to a new start and a new goal.
+
+The imitated path is the demonstration moved rigidly so that it ends at the goal; the final path blends from
+the start to a guiding pose on it along one screw, and then is the imitated path. Paper: section III.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from . import dualquat as dq
+from .errors import BadOption, PlanFailed
+from .pose import Pose, PosePath
+
+GUIDE_START = 0.2
+"""Fraction of the imitated path where blending ends; the value of the paper's experiments."""
+
+
+def transfer_to(demonstrated: PosePath, goal: Pose) -> Pose:
+    """The displacement `g = x_f d_n*` that carries the demonstrated path to the goal."""
+    return goal @ demonstrated[-1].inverse()
+
+
+def imitated_path(demonstrated: PosePath, goal: Pose) -> PosePath:
+    """The demonstrated path moved rigidly so that it ends at the goal; every relative motion is kept.
+
+    Constraints in frames of the goal object are kept; constraints against gravity are kept if and only if
+    the tilt of `transfer_to(...)` is zero. Paper: eq. (5) and (6), which are this one product.
+    """
+    moved = demonstrated.moved(transfer_to(demonstrated, goal))
+    # the product of d_n with its own inverse is 1 only up to rounding
+    sign = 1.0 if moved.dqs[-1, :4] @ goal.dq[:4] >= 0 else -1.0
+    return PosePath(np.concatenate([moved.dqs[:-1], sign * goal.dq[None]]))
+
+
+def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "length") -> int:
+    """Index of the guiding pose, at which blending into the path ends.
+
+    Args:
+        path: the imitated path.
+        fraction: in [0, 1] of the path from its start.
+        by: "length" (screw length: left-invariant) or "index" (invariant to both world and tool changes).
+
+    Paper: "20 % to 70 % of the length" without saying of which metric, nor from which end.
+    """
+    if not 0.0 <= fraction <= 1.0:
+        raise BadOption("fraction", f"{fraction} is not in [0, 1]")
+    last = len(path) - 1
+    if by == "index":
+        index = math.ceil(fraction * last)
+    elif by == "length":
+        lengths = path.lengths()
+        index = int(np.argmax(lengths >= fraction * lengths[-1])) if lengths[-1] > 0 else last
+    else:
+        raise BadOption("by", f"{by!r} is not one of length, index")
+    return min(max(index, 1), last)
+
+
+def screw_path(start: Pose, end: Pose, step: float) -> PosePath:
+    """Poses along the screw from start to end, both included, at most `step` [m] of screw length apart."""
+    length = PosePath(np.stack([start.dq, end.dq])).lengths()[-1]
+    tau = np.linspace(0.0, 1.0, max(1, math.ceil(length / step)) + 1)
+    poses = dq.sclerp(start.dq, end.dq, tau)
+    poses[0], poses[-1] = start.dq, end.dq
+    return PosePath(poses)
+
+
+def final_path(start: Pose, imitated: PosePath, guide: int) -> PosePath:
+    """One screw from the start to the guiding pose, then the imitated path: begins and ends exactly.
+
+    Args:
+        start: where the tcp is.
+        imitated: the imitated path.
+        guide: index of the guiding pose in it.
+    """
+    lengths = imitated.lengths()
+    step = lengths[-1] / max(len(imitated) - 1, 1)
+    blend = screw_path(start, imitated[guide], step if step > 0 else 0.005)
+    tail = imitated[guide:]
+    return PosePath(np.concatenate([blend.dqs[:-1], tail.dqs]))
+
+
+def departure(demonstrated: PosePath, start: Pose, length: float) -> PosePath:
+    """How the demonstration leaves its beginning, done from the start: `x_0 d_1* d_j`.
+
+    Args:
+        demonstrated: the segment whose beginning is imitated; `reversed()` of a segment gives the withdrawal.
+        start: where the tcp is.
+        length: screw length [m] to keep.
+
+    Not in the paper: goal-anchored imitation forgets the lift and the withdrawal, and drags what it holds.
+    """
+    count = int(np.searchsorted(demonstrated.lengths(), length, side="right"))
+    part = demonstrated[: max(1, count)]
+    return part.moved(start @ demonstrated[0].inverse())
+
+
+def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
+    """Imitation anchored at both ends: the beginning as shown from the start, the end as shown to the goal.
+
+    Meets both ends and is the demonstration itself where the start fits the goal. The weight between the
+    two is a smooth step over the screw length. Not in the paper.
+    """
+    from_start = demonstrated.moved(start @ demonstrated[0].inverse())
+    to_goal = imitated_path(demonstrated, goal)
+    lengths = demonstrated.lengths()
+    s = lengths / lengths[-1] if lengths[-1] > 0 else np.linspace(0.0, 1.0, len(demonstrated))
+    return PosePath(dq.sclerp(from_start.dqs, to_goal.dqs, s * s * (3.0 - 2.0 * s)))
+
+
+def reachable_guide(
+    path: PosePath, first: int, last: int, margins: Callable[[PosePath], np.ndarray], min_margin: float
+) -> int:
+    """The first guide index from `first` on whose whole tail can be reached, at most `last`.
+
+    The imitated path may leave the workspace though start and goal do not.
+
+    Args:
+        path: the imitated path.
+        first: the guide that one would take.
+        last: the guide beyond which too little of the path is left.
+        margins: joint margins [rad] of the poses of a path, -inf where there is no joint solution.
+        min_margin: smallest margin [rad] that counts as reachable.
+
+    Raises:
+        PlanFailed: "ik_or_limit", no tail from `last` on can be reached.
+
+    Not in the paper.
+    """
+    bad = np.flatnonzero(margins(path[first:]) < min_margin)
+    guide = first + (int(bad[-1]) + 1 if len(bad) else 0)
+    if guide > last:
+        raise PlanFailed("ik_or_limit", f"the imitated path cannot be reached behind {guide / len(path):.0%} of it")
+    return guide
