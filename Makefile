@@ -1,0 +1,54 @@
+# make demo    install into .venv, then stack three blocks from one demonstration
+# make test    install into .venv, then run the tests (at most 10 minutes on 2 cores)
+# make check   lint, types and tests
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+FOLDERS := envs planner baselines configs bench tests
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test slow lint types check perf clean
+
+help: ## show the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+$(BIN)/python:
+	@sh .ci/prerequisites $(PYTHON)
+	@echo "making $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
+	@echo "installing (about a minute)"
+	@$(PIP) install --quiet --editable . --constraint constraints.txt
+	@touch $@
+
+$(VENV)/.developed: pyproject.toml constraints.txt | $(BIN)/python
+	@echo "installing with the developers' tools (about a minute)"
+	@$(PIP) install --quiet --editable '.[dev]' --constraint constraints.txt
+	@touch $@ $(VENV)/.installed
+
+demo: $(VENV)/.installed ## stack three blocks from one demonstration: report, figure, video
+	@$(BIN)/onedemo run configs/bench/stack.yaml
+
+test: $(VENV)/.developed ## run the tests
+	@$(BIN)/python -m pytest -m "not slow"
+
+slow: $(VENV)/.developed ## run the long tests too
+	@$(BIN)/python -m pytest
+
+lint: $(VENV)/.developed ## ruff
+	@$(BIN)/ruff check $(FOLDERS)
+	@$(BIN)/ruff format --check --quiet $(FOLDERS)
+
+types: $(VENV)/.developed ## pyright
+	@$(BIN)/pyright
+
+check: lint types test ## lint, types and tests
+
+perf: $(VENV)/.developed ## the table of speeds
+	@$(BIN)/onedemo perf
+
+clean: ## remove the environment, the caches and the builds; runs/ stays
+	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,102 @@
+"""The planner as a policy: one demonstration, the observation, no training."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..envs.task import TaskDescription
+from ..planner.demo import Demonstration
+from ..planner.errors import BadOption, PlanFailed, UnknownName
+from ..planner.motions import MotionSettings
+from .hand import Hand
+from .policy import EpisodePolicy, Observation, PolicyReport
+from .stack_program import StackProgram
+
+
+@dataclass(frozen=True, slots=True)
+class ScrewSettings:
+    """How the demonstration becomes a program.
+
+    Attributes:
+        motion: the motions; see `MotionSettings`.
+        resample: screw length [m] between the poses of a demonstrated segment; removes pauses and trembling
+            from the rule that advances along the path.
+        trim: distance [m] to the end of the transfer at which its tail is cut, because people fumble there.
+        release_height: height [m] above rest at which a held object is released. Pressed on its support, a
+            slightly tilted object is thrown aside when the fingers open.
+        settle: seconds of standing still before the gripper moves, so that the servos catch up.
+        close: seconds given to closing.
+        open: seconds given to opening.
+    """
+
+    motion: MotionSettings = field(default_factory=MotionSettings)
+    resample: float = 0.005
+    trim: float = 0.02
+    release_height: float = 0.005
+    settle: float = 0.5
+    close: float = 0.5
+    open: float = 0.3
+
+    def __post_init__(self):
+        for name in ("resample", "trim"):
+            if not getattr(self, name) > 0:
+                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
+        for name in ("release_height", "settle", "close", "open"):
+            if getattr(self, name) < 0:
+                raise BadOption(name, f"{getattr(self, name)} is negative")
+
+
+PROGRAMS = {"stack": StackProgram}
+
+
+class Episode:
+    """What the policy remembers of an episode: the hand, the running program and how it ended."""
+
+    def __init__(self, hand: Hand, program: StackProgram):
+        self.hand, self.program = hand, program
+        self.actions: Iterator[np.ndarray] | None = program.actions()
+        self.ended = PolicyReport()
+
+
+class ScrewPolicy(EpisodePolicy):
+    """TSIA with screw interpolation and the dual-quaternion controller, from ONE demonstration.
+
+    Sees the observation, the demonstration and the static task description, nothing else.
+    """
+
+    def __init__(
+        self, task: TaskDescription, demonstration: Demonstration, settings: ScrewSettings | None = None
+    ):
+        if task.name not in PROGRAMS:
+            raise UnknownName("task of the screw policy", task.name, PROGRAMS)
+        self.task, self.demonstration = task, demonstration
+        self.settings = settings or ScrewSettings()
+        if abs(self.settings.motion.dt - task.control_dt) > 1e-9:
+            raise BadOption(
+                "motion.dt", f"{self.settings.motion.dt} s, but the task acts every {task.control_dt} s"
+            )
+
+    def begin(self, observation: Observation) -> Episode:
+        """A new episode; nothing is planned yet."""
+        hand = Hand(self.task.arms[0], self.settings.motion, observation)
+        return Episode(hand, PROGRAMS[self.task.name](self.task, self.demonstration, self.settings, hand))
+
+    def act(self, observation: Observation, memory: Episode) -> np.ndarray:
+        """The next action of the program; standing still once it has ended or given up."""
+        memory.hand.observation = observation
+        if memory.actions is not None:
+            try:
+                return next(memory.actions)
+            except StopIteration:
+                memory.ended = PolicyReport(done=True)
+            except PlanFailed as failure:
+                memory.ended = PolicyReport(True, failure.reason, failure.detail)
+            memory.actions = None
+        return memory.hand.still()
+
+    def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
+        """What happened in the episode of one environment of the state."""
+        return replace(state[index].ended, paths=tuple(state[index].program.paths))

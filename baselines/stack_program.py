@@ -1,0 +1,130 @@
+"""Stacking from the demonstration of ONE block: fetch, place, fetch, place, …
+
+Only the goals are new: a grasp is where the demonstrated hand was relative to the object it took, a release is
+where the object must end, seen from how the hand holds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..envs.task import TaskDescription, TaskObject
+from ..planner.demo import Demonstration
+from ..planner.errors import PlanFailed
+from ..planner.motions import Motion, plan_motion
+from ..planner.pose import Pose, PosePath
+from ..planner.segment import resampled, trimmed
+from ..planner.tsia import departure
+from .hand import CLOSE, OPEN, Hand
+from .policy import LabeledPath
+
+if TYPE_CHECKING:
+    from .screw_policy import ScrewSettings
+
+LOST = 0.03
+"""Distance [m] of the object from where it should be in the hand beyond which it was dropped."""
+
+
+def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
+    """All `object_from_tcp` that repeat the demonstrated grasp on an object, one per symmetric yaw.
+
+    The demonstrated grasp is turned so that the fingers close along the object's narrower horizontal axis.
+    """
+    object_pose = demonstration.segment("approach").reference_pose
+    shown = object_pose.inverse() @ demonstration.segment_path("approach")[-1]
+    closing = np.abs(shown.rotation[:2, 0])  # fingers close along the x axis of the tcp
+    aligned = int(np.argmax(closing)) == int(np.argmin(target.size[:2]))
+    extra = 0.0 if aligned else np.pi / 2
+    return [Pose.from_yaw([0, 0, 0], yaw + extra) @ shown for yaw in target.symmetric_yaws]
+
+
+def releases(target: TaskObject, goal: Pose, tcp_from_object: Pose, height: float) -> list[Pose]:
+    """All poses of the tcp at which the held object is above its goal, one per symmetric yaw."""
+    above = Pose.from_position_quaternion([0, 0, height]) @ goal
+    return [
+        above @ Pose.from_yaw([0, 0, 0], yaw) @ tcp_from_object.inverse() for yaw in target.symmetric_yaws
+    ]
+
+
+class StackProgram:
+    """The program of one episode; iterate over `actions()`."""
+
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
+        self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
+        step = settings.resample
+        self.approach = resampled(shown.segment_path("approach"), step)
+        self.transfer = resampled(trimmed(shown.segment_path("transfer"), settings.trim), step)
+        self.withdrawal = self.approach.reversed()
+        self.paths = [
+            LabeledPath("demonstrated", "approach", self.approach),
+            LabeledPath("demonstrated", "transfer", self.transfer),
+        ]
+
+    def actions(self) -> Iterator[np.ndarray]:
+        """Fetch and place each object in order, then withdraw."""
+        for k in range(len(self.task.objects)):
+            yield from self._fetch(k)
+            yield from self._place(k)
+        yield from self._depart(self.withdrawal)
+
+    def _fetch(self, k: int) -> Iterator[np.ndarray]:
+        motion = self._chosen_fetch(k)
+        self.paths.append(LabeledPath("final", f"fetch {self.task.objects[k].name}", motion.final_path))
+        if motion.departure is not None:
+            yield from self.hand.follow(motion.departure, loosely=True)
+        yield from self.hand.follow(motion.tail)
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(CLOSE, self.settings.close)
+
+    def _place(self, k: int) -> Iterator[np.ndarray]:
+        target = self.task.objects[k]
+        grasped = self._held(k)
+        start = self.hand.arm.fk(self.hand.q)
+        yield from self._depart(self.transfer)
+        # the object slips a little while it is lifted: the goal is computed from how it is held now
+        held = self._held(k)
+        if held.gap(grasped)[0] > LOST:
+            raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
+        motion = _best(self._placements(self.hand.q, k, held, leaving=None), target.name)
+        lift = departure(self.transfer, start, self.settings.motion.departure)
+        self.paths.append(LabeledPath("final", f"place {target.name}", lift.joined(motion.final_path)))
+        yield from self.hand.follow(motion.tail)
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(OPEN, self.settings.open)
+
+    def _depart(self, leaving: PosePath) -> Iterator[np.ndarray]:
+        start = self.hand.arm.fk(self.hand.q)
+        away = departure(leaving, start, self.settings.motion.departure)
+        return self.hand.follow(away, loosely=True)
+
+    def _held(self, k: int) -> Pose:
+        """`tcp_from_object` as observed."""
+        return self.hand.measured_tcp.inverse() @ self.hand.object_pose(k)
+
+    def _chosen_fetch(self, k: int) -> Motion:
+        """The grasp from which the object can also be placed, by kinematic roll-outs of both motions."""
+        target, hand = self.task.objects[k], self.hand
+        candidates = []
+        for grasp in grasps(self.shown, target):
+            goal = hand.object_pose(k) @ grasp
+            leaving = self.withdrawal if k else None
+            fetch = plan_motion(hand.arm, hand.q, self.approach, goal, self.settings.motion, leaving=leaving)
+            for place in self._placements(fetch.q, k, grasp.inverse(), leaving=self.transfer):
+                order = (fetch.arrives, place.arrives, min(fetch.margin, place.margin))
+                candidates.append((order, len(candidates), fetch))
+        return _best([max(candidates)[2]], target.name)
+
+    def _placements(self, q: np.ndarray, k: int, held: Pose, leaving: PosePath | None) -> list[Motion]:
+        goals = releases(self.task.objects[k], self.hand.goal_pose(k), held, self.settings.release_height)
+        arm, settings = self.hand.arm, self.settings.motion
+        return [plan_motion(arm, q, self.transfer, goal, settings, leaving=leaving) for goal in goals]
+
+
+def _best(motions: list[Motion], name: str) -> Motion:
+    chosen = max(motions, key=lambda motion: (motion.arrives, motion.margin))
+    if not chosen.arrives:
+        raise PlanFailed(chosen.reason, f"no symmetric goal of {name} can be reached along the demonstration")
+    return chosen
