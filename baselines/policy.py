@@ -56,15 +56,15 @@ class Policy(Protocol):
         episode_start: np.ndarray | None = None,
         deterministic: bool = True,
     ) -> tuple[np.ndarray, Any]:
-        """Actions for one observation, or for a batch with a leading axis; and the state to pass next time."""
+        """Actions for one observation, or for a batch with a leading axis; and the next state."""
         ...
 
 
 class EpisodePolicy(ABC):
     """A policy that keeps a memory per episode; this class does the batching.
 
-    The state is a tuple with one memory per environment. A memory is changed by each call: a state is good for
-    one further call only.
+    The state is a tuple with one memory per environment. A memory is changed by each call: a state is good
+    for one further call only.
     """
 
     @abstractmethod

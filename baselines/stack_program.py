@@ -1,7 +1,7 @@
-"""Stacking from the demonstration of ONE block: fetch, place, fetch, place, …
+"""Stacking from the demonstration of ONE block: fetch and place, again and again.
 
-Only the goals are new: a grasp is where the demonstrated hand was relative to the object it took, a release is
-where the object must end, seen from how the hand holds it.
+Only the goals are new: a grasp is where the demonstrated hand was relative to the object it took, a release
+is where the object must end, seen from how the hand holds it.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ import numpy as np
 from ..envs.task import TaskDescription, TaskObject
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
-from ..planner.motions import Motion, plan_motion
+from ..planner.motions import Motion, plan_motion, reachable_departure
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
-from ..planner.tsia import departure
 from .hand import CLOSE, OPEN, Hand
 from .policy import LabeledPath
 
@@ -68,7 +67,7 @@ class StackProgram:
         for k in range(len(self.task.objects)):
             yield from self._fetch(k)
             yield from self._place(k)
-        yield from self._depart(self.withdrawal)
+        yield from self.hand.follow(self._way_out(self.withdrawal), loosely=True)
 
     def _fetch(self, k: int) -> Iterator[np.ndarray]:
         motion = self._chosen_fetch(k)
@@ -82,23 +81,20 @@ class StackProgram:
     def _place(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
         grasped = self._held(k)
-        start = self.hand.arm.fk(self.hand.q)
-        yield from self._depart(self.transfer)
+        lift = self._way_out(self.transfer)
+        yield from self.hand.follow(lift, loosely=True)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held(k)
         if held.gap(grasped)[0] > LOST:
             raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
         motion = _best(self._placements(self.hand.q, k, held, leaving=None), target.name)
-        lift = departure(self.transfer, start, self.settings.motion.departure)
         self.paths.append(LabeledPath("final", f"place {target.name}", lift.joined(motion.final_path)))
         yield from self.hand.follow(motion.tail)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(OPEN, self.settings.open)
 
-    def _depart(self, leaving: PosePath) -> Iterator[np.ndarray]:
-        start = self.hand.arm.fk(self.hand.q)
-        away = departure(leaving, start, self.settings.motion.departure)
-        return self.hand.follow(away, loosely=True)
+    def _way_out(self, leaving: PosePath) -> PosePath:
+        return reachable_departure(self.hand.arm, self.hand.q, leaving, self.settings.motion)[0]
 
     def _held(self, k: int) -> Pose:
         """`tcp_from_object` as observed."""

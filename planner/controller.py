@@ -2,15 +2,15 @@
 
 Two laws give a task matrix M (6, dof) and a task velocity b (6) with `M qdot = b`:
 
-- `log` (default): `J_b qdot = gain * 2 log(x_m* x_d)`. The tcp moves exactly along the screw to the target and
-  every component of the error decays as exp(-gain t).
+- `log` (default): `J_b qdot = gain * 2 log(x_m* x_d)`. The tcp moves exactly along the screw to the target
+  and every component of the error decays as exp(-gain t).
 - `paper`: `N qdot = gain * vec(1 - x_m* x_d)` with `N = H-(x_d) C8 J8`. The paper prints the opposite sign,
   with which the arm runs away. N is 8 x dof of rank 6: with `A = Q R`, `N = A J_b`, it is solved as
   `(R J_b) qdot = gain * Q^T vec e`, which is the same pseudo-inverse without the two zero singular values.
 
-Both end in `qdot = M^T (M M^T + mu^2 I)^-1 b + (I - J_b^+ J_b) z`, then the limits: a joint that would pass its
-position limit is held at the allowed speed and the others take over (Not in the paper: a joint stopped alone
-bends the path, see Flacco, De Luca and Khatib 2012), then all speeds are scaled together.
+Both end in `qdot = M^T (M M^T + mu^2 I)^-1 b + (I - J_b^+ J_b) z`, then the limits: a joint that would pass
+its position limit is held at the allowed speed and the others take over, then all speeds are scaled together.
+(Not in the paper: a joint that is stopped alone bends the path; see Flacco, De Luca and Khatib 2012.)
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .pose import Pose
 
 LAWS = ("log", "paper")
 NULL_CUT_OFF = 1e-3
-"""Singular value of the Jacobian below which the null-space task rests: its projector is not defined there."""
+"""Singular value of the Jacobian below which the null-space task rests: it has no projector there."""
 SIGN_HYSTERESIS = 0.1
 """Scalar part of the error beyond which the controller changes to the other way round."""
 
@@ -137,7 +137,7 @@ def _cap_twist(law, max_linear, max_angular, work):
 
 @kernel
 def _factor(row, n, work):
-    """Factor `M M^T` of the six rows from `row` on; the bound of M's sixth singular value, 0 if it is rank-deficient."""
+    """Factor `M M^T` of the six rows from `row` on; bound of M's sixth singular value, 0 if there is none."""
     gram(work, row, n, work, GRAM)
     if not cholesky(work, GRAM, 0.0, work, FACTOR):
         return 0.0

@@ -126,7 +126,7 @@ def identity() -> Array:
 
 
 def mul(a: ArrayLike, b: ArrayLike) -> Array:
-    """Product (..., 8): composition of poses, `world_from_c = mul(world_from_b, b_from_c)`."""
+    """Product of dual quaternions (..., 8), the composition of poses: `world_from_b` times `b_from_c`."""
     a, b = _rows("a", a, 8), _rows("b", b, 8)
     shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
     out = np.empty((math.prod(shape), 8))
@@ -135,7 +135,7 @@ def mul(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def conj(x: ArrayLike) -> Array:
-    """Conjugate (..., 8): the inverse of a unit dual quaternion."""
+    """Conjugate (..., 8), the inverse of a unit dual quaternion."""
     return _rows("dual quaternion", x, 8) * np.diag(CONJUGATE_8)
 
 
@@ -202,7 +202,7 @@ def exp(pure: ArrayLike) -> Array:
 
 
 def power(x: ArrayLike, tau: ArrayLike) -> Array:
-    """x to the power tau (..., 8): the fraction tau of the shortest screw motion to x."""
+    """Power x^tau (..., 8): the fraction tau of the shortest screw motion to x."""
     return dq_from_twist(np.asarray(tau, dtype=np.float64)[..., None] * twist_from_dq(x))
 
 
@@ -254,12 +254,12 @@ def dq_from_screw_parameters(screw_: ScrewParameters) -> Array:
 
 
 def hamilton_plus(a: ArrayLike) -> Array:
-    """Matrix (8, 8) of the product from the left: `vec(a b) = hamilton_plus(a) vec(b)`."""
+    """Matrix H+ (8, 8) of the product from the left, `vec(a b) = H+(a) vec(b)`."""
     return _hamilton(a, 1.0)
 
 
 def hamilton_minus(b: ArrayLike) -> Array:
-    """Matrix (8, 8) of the product from the right: `vec(a b) = hamilton_minus(b) vec(a)`."""
+    """Matrix H- (8, 8) of the product from the right, `vec(a b) = H-(b) vec(a)`."""
     return _hamilton(b, -1.0)
 
 

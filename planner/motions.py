@@ -14,7 +14,7 @@ from .errors import BadOption, PlanFailed
 from .ik import path_margins
 from .pose import Pose, PosePath
 from .pursuit import Pursuit, PursuitSettings, RollOut
-from .tsia import departure, final_path, guide_index, imitated_path, reachable_guide
+from .tsia import departure, final_path, guide_index, imitated_path, reachable_guide, screw_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +87,20 @@ def follow(arm: Arm, path: PosePath, settings: MotionSettings, *, loosely: bool 
     return Pursuit(arm, path, settings.dt, controller=settings.controller, settings=pursuit)
 
 
+def reachable_departure(
+    arm: Arm, q: np.ndarray, leaving: PosePath, settings: MotionSettings
+) -> tuple[PosePath, RollOut]:
+    """The departure as shown; where the arm cannot do it, straight up by as much, if it can do that."""
+    start = arm.fk(q)
+    up = Pose.from_position_quaternion([0.0, 0.0, settings.departure]) @ start
+    options = (
+        departure(leaving, start, settings.departure),
+        screw_path(start, up, settings.pursuit.capture_radius),
+    )
+    tries = [(path, follow(arm, path, settings, loosely=True).roll_out(q)) for path in options]
+    return max(tries, key=lambda option: option[1].arrived)
+
+
 def plan_motion(
     arm: Arm,
     q: np.ndarray,
@@ -98,8 +112,9 @@ def plan_motion(
 ) -> Motion:
     """The motion of a demonstrated segment from joints q to a goal pose of the tcp.
 
-    The guide is moved on to where the whole tail can be reached if the roll-out with the wanted guide fails or
-    comes too close to a joint limit; of the two the one that arrives, then the one with more margin, is taken.
+    If the roll-out with the wanted guide fails or comes too close to a joint limit, the guide is moved on to
+    where the whole tail can be reached; of the two the one that arrives, then the one with more margin, is
+    taken.
 
     Args:
         arm: the arm.
@@ -112,8 +127,7 @@ def plan_motion(
     away = None
     before = RollOut(True, "", q, 0.0, arm.margin(q), q[None])
     if leaving is not None and settings.departure > 0:
-        away = departure(leaving, arm.fk(q), settings.departure)
-        before = follow(arm, away, settings, loosely=True).roll_out(q)
+        away, before = reachable_departure(arm, q, leaving, settings)
     imitated = imitated_path(demonstrated, goal)
     first = guide_index(imitated, settings.guide)
     motion = _rolled_out(arm, before, away, imitated, first, settings)

@@ -118,6 +118,11 @@ class Pose:
         _, x, y, _ = self.dq[:4]
         return float(2 * np.arcsin(min(1.0, np.hypot(x, y))))
 
+    def __repr__(self) -> str:
+        """Position and quaternion, rounded."""
+        numbers = " ".join(f"{value:.4g}" for value in self.vector)
+        return f"Pose([{numbers}])"
+
     def inverse(self) -> Pose:
         """`b_from_a` of `a_from_b`."""
         return Pose(dq.conj(self.dq))
@@ -170,6 +175,10 @@ class PosePath:
     def vectors(self) -> np.ndarray:
         """(n, 7): x y z [m] then quaternion wxyz."""
         return np.concatenate([self.positions, self.quaternions], axis=1)
+
+    def __repr__(self) -> str:
+        """Number of poses, first and last."""
+        return f"PosePath({len(self)} poses, {self[0]!r} to {self[-1]!r})"
 
     def __len__(self) -> int:
         """Number of poses."""

@@ -176,7 +176,7 @@ class Pursuit:
         return pursue(self.arm.chain, self._limits, path, q, self.dt, *shared), qdot
 
     def roll_out(self, q: ArrayLike, max_seconds: float = 60.0) -> RollOut:
-        """Follow the path to its end with ideal tracking, from its beginning; the pursuit itself is unchanged."""
+        """Follow the whole path with ideal tracking; the pursuit itself is unchanged."""
         q = np.array(q, dtype=np.float64)
         trace = np.empty((round(max_seconds / self.dt) + 1, self.arm.dof))
         memory = np.array([0.0, 0.0, np.inf, 0.0])
