@@ -94,3 +94,14 @@ class PlanFailed(OneDemoError):
     def __init__(self, reason: str, detail: str):
         self.reason, self.detail = reason, detail
         super().__init__(f"{reason}: {detail}")
+
+
+class RenderingUnavailable(OneDemoError, RuntimeError):
+    """No OpenGL library can draw without a display."""
+
+    def __init__(self, detail: str):
+        self.detail = detail
+        super().__init__(
+            f"no picture can be drawn ({detail}); install one of: apt install libegl1 libegl-mesa0 "
+            "libgl1-mesa-dri, or apt install libosmesa6"
+        )

@@ -1,0 +1,190 @@
+"""Stacking wooden blocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..planner.errors import BadOption, UnknownName
+from .base import OneDemoEnv
+from .layouts import TABLE_EDGE, Layout, level_named, stack_layout
+from .options import checked_joints, checked_poses
+from .sim import TABLE_HEIGHT, Box
+from .spaces import observation_space
+from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress, allowed_contact, shaped
+from .task import TaskDescription, TaskObject
+
+TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
+OPTIONS = ("level", "object_poses", "base_pose", "joint_positions")
+
+
+class StackEnv(OneDemoEnv):
+    """Stack wooden blocks at a given place, in order, with one arm.
+
+    ## Description
+    Wooden blocks (60 x 40 x 50 mm, 72 g) lie on a table. Block 0 must be put at the base place, block 1 onto it,
+    and so on. They are held by friction between the fingers only. Success is judged from the simulator: every
+    block within 10 mm in the plane, 10 degrees of yaw (a block looks the same after half a turn) and 5 mm in height
+    of its place, touched by no finger, standing still, the hand withdrawn by 5 cm, for half a second.
+
+    ## Action Space
+    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz.
+
+    | index | `control_mode="joint_velocity"` | `control_mode="ee_twist"` |
+    |---|---|---|
+    | 0 to 6 (0 to 5) | joint speed as a fraction of the joint's limit | tcp velocity, then angular velocity, in world axes, as fractions of 0.25 m/s and 1.2 rad/s |
+    | last | gripper: above 0 closes, below 0 opens, 0 leaves it | the same |
+
+    ## Observation Space
+    A `Dict` of float64 boxes; the first axis counts arms or blocks. Poses are `x y z [m]`, then quaternion wxyz.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | `joint_positions` | (1, 7) | [rad] |
+    | `joint_velocities` | (1, 7) | [rad/s] |
+    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `gripper_opening` | (1,) | gap between the finger pads [m] |
+    | `object_pose` | (n, 7) | the blocks |
+    | `goal_pose` | (n, 7) | where each block must end; constant during an episode |
+    | `motion_index` | (1,) | 2k while block k is to be fetched, 2k + 1 while it is held, 2n when all are placed |
+
+    ## Rewards
+    `reward="dense"`: in [0, 1], the share of the task that is done, with reaching, grasping and carrying of the
+    current block in between. `reward="sparse"`: 1 with success, else 0.
+
+    ## Starting State
+    By `level`: L0 the nominal row; L1 blocks moved by up to 10 cm and turned by up to 30 degrees, the base place by
+    up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
+    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis.
+
+    ## Episode End
+    `terminated` with a settled success, or when a block has fallen off the table. `truncated` after 60 s for three
+    blocks (Gymnasium's `TimeLimit`).
+
+    ## Info
+    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
+    `n_contacts`, `min_obstacle_distance`, `blocks_placed`, `position_error` (n,) [m], `yaw_error` (n,) [rad].
+
+    ## Arguments
+    `robot="Panda"`, `n_blocks=3` (2 to 6), `level="L1"`, `control_mode="joint_velocity" | "ee_twist"`,
+    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
+    `reset(options=...)` takes `level`, `object_poses` (n, 7), `base_pose` (7,) of the lowest block's goal, and
+    `joint_positions` (7,).
+
+    ## Version History
+    * v0: first version.
+    """
+
+    def __init__(
+        self,
+        robot: str = "Panda",
+        n_blocks: int = 3,
+        level: str = "L1",
+        control_mode: str = "joint_velocity",
+        reward: str = "sparse",
+        control_frequency: int = 50,
+        render_mode: str | None = None,
+    ):
+        if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 2 <= n_blocks <= 6:
+            raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 2 to 6")
+        level_named(level)
+        boxes = tuple(Box(f"block{k}", BLOCK_SIZE, TEXTURES[k]) for k in range(n_blocks))
+        super().__init__(
+            robot=robot,
+            boxes=boxes,
+            control_mode=control_mode,
+            reward=reward,
+            render_mode=render_mode,
+            control_frequency=control_frequency,
+        )
+        self.level, self.n_blocks = level, n_blocks
+        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
+        self.observation_space = observation_space(self.arms, widths, n_blocks, 2 * n_blocks)
+        self._task = TaskDescription(
+            name="stack",
+            robot=robot,
+            arms=self.arms,
+            control_dt=self.control_dt,
+            objects=tuple(TaskObject(box.name, np.array(box.size), np.pi) for box in boxes),
+            table_height=TABLE_HEIGHT,
+            gripper_width=widths,
+        )
+        self._goal_pose = np.zeros((n_blocks, 7))
+        self._goal_lists = self._goal_pose.tolist()
+        self._progress = StackProgress(n_blocks, self.control_dt)
+
+    @property
+    def task(self) -> TaskDescription:
+        """What every policy may know beforehand."""
+        return self._task
+
+    def _start(self, options: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+        for key in options:
+            if key not in OPTIONS:
+                raise UnknownName("reset option", key, OPTIONS)
+        level = level_named(options.get("level", self.level))
+        home = self.sim.scene.home
+        axis = np.array(self.sim.model.body("robot0_base").pos[:2])
+        layout = stack_layout(self.np_random, level, self.n_blocks, axis, home.shape)
+        poses, base = _poses(layout)
+        if "object_poses" in options:
+            poses = checked_poses("object_poses", options["object_poses"], self.n_blocks)
+        if "base_pose" in options:
+            base = checked_poses("base_pose", [options["base_pose"]], 1)[0]
+        _check_places(poses, base)
+        joints = np.clip(home + layout.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
+        if "joint_positions" in options:
+            joints = checked_joints(options["joint_positions"], self.arms)
+        self._goal_pose = np.repeat(base[None], self.n_blocks, axis=0)
+        self._goal_pose[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
+        self._goal_lists = self._goal_pose.tolist()
+        self._progress = StackProgress(self.n_blocks, self.control_dt)
+        return joints, poses
+
+    def _goals(self) -> tuple[np.ndarray, float]:
+        return self._goal_pose.copy(), self._progress.motion_index
+
+    def _judge(self) -> tuple[float, bool, dict[str, Any]]:
+        sim, progress = self.sim, self._progress
+        poses, goals = sim.object_poses().tolist(), self._goal_lists
+        tcp, touching = sim.data.site_xpos[sim.scene.arms[0].site].tolist(), sim.contacts()
+        progress.update(poses, goals, tcp, touching, sim.object_velocities().tolist())
+        for pair in touching:
+            if not allowed_contact(pair, progress):
+                progress.collisions += 1
+                progress.collision = sim.contact_name(pair)
+        fallen = min(pose[2] for pose in poses) < TABLE_HEIGHT - 0.05
+        if fallen:
+            progress.failure = "off_table"
+        reward = float(progress.success)
+        if self.reward_kind == "dense":
+            reward = shaped(poses, goals, tcp, progress)
+        return reward, progress.success or fallen, progress.info()
+
+
+def _poses(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """World poses (n, 7) of the blocks and (7,) of the lowest goal."""
+    rows = np.vstack([layout.blocks, layout.base])
+    height = TABLE_HEIGHT + 0.5 * BLOCK_SIZE[2]
+    zeros = np.zeros(len(rows))
+    half = 0.5 * rows[:, 2]
+    poses = np.column_stack([rows[:, :2], zeros + height, np.cos(half), zeros, zeros, np.sin(half)])
+    return poses[:-1], poses[-1]
+
+
+def _check_places(poses: np.ndarray, base: np.ndarray) -> None:
+    """Refuse blocks off the table or inside each other, and a base place off the table or tilted."""
+    for k, pose in enumerate(poses):
+        if np.abs(pose[:2]).max() > TABLE_EDGE or pose[2] < TABLE_HEIGHT + 0.4 * BLOCK_SIZE[2]:
+            raise BadOption(
+                "object_poses", f"block {k} at {np.round(pose[:3], 3).tolist()} is not on the table"
+            )
+        for j in range(k):
+            apart = poses[j, :3] - pose[:3]
+            if np.hypot(*apart[:2]) < BLOCK and abs(apart[2]) < 0.9 * BLOCK_SIZE[2]:
+                raise BadOption("object_poses", f"blocks {j} and {k} are inside each other")
+    if np.abs(base[:2]).max() > TABLE_EDGE or abs(base[2] - TABLE_HEIGHT - 0.5 * BLOCK_SIZE[2]) > 0.005:
+        raise BadOption("base_pose", f"{np.round(base[:3], 3).tolist()} is not a place on the table")
+    if np.hypot(base[4], base[5]) > 0.01:
+        raise BadOption("base_pose", "is tilted; only a yaw is possible")
