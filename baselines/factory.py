@@ -46,9 +46,7 @@ def make_policy(
     if name not in POLICIES:
         raise UnknownName("policy", name, POLICIES)
     kind = POLICIES[name]
-    return kind.make(
-        task, demonstration, settings_from(kind.settings, settings or {}, f"settings of {name!r}")
-    )
+    return kind.make(task, demonstration, settings_from(kind.settings, settings or {}, f"settings of {name!r}"))
 
 
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:
@@ -59,9 +57,7 @@ def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) 
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         if first["type"] == "unexpected_keyword_argument":
-            raise BadConfig(
-                source, key, f"unknown key; allowed: {', '.join(_allowed(kind, first['loc']))}"
-            ) from None
+            raise BadConfig(source, key, f"unknown key; allowed: {', '.join(_allowed(kind, first['loc']))}") from None
         raise BadConfig(source, key, first["msg"]) from None
     except OneDemoError as error:
         raise BadConfig(source, "", str(error)) from None

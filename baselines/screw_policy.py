@@ -67,17 +67,13 @@ class ScrewPolicy(EpisodePolicy):
     Sees the observation, the demonstration and the static task description, nothing else.
     """
 
-    def __init__(
-        self, task: TaskDescription, demonstration: Demonstration, settings: ScrewSettings | None = None
-    ):
+    def __init__(self, task: TaskDescription, demonstration: Demonstration, settings: ScrewSettings | None = None):
         if task.name not in PROGRAMS:
             raise UnknownName("task of the screw policy", task.name, PROGRAMS)
         self.task, self.demonstration = task, demonstration
         self.settings = settings or ScrewSettings()
         if abs(self.settings.motion.dt - task.control_dt) > 1e-9:
-            raise BadOption(
-                "motion.dt", f"{self.settings.motion.dt} s, but the task acts every {task.control_dt} s"
-            )
+            raise BadOption("motion.dt", f"{self.settings.motion.dt} s, but the task acts every {task.control_dt} s")
 
     def begin(self, observation: Observation) -> Episode:
         """A new episode; nothing is planned yet."""

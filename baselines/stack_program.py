@@ -43,9 +43,7 @@ def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
 def releases(target: TaskObject, goal: Pose, tcp_from_object: Pose, height: float) -> list[Pose]:
     """All poses of the tcp at which the held object is above its goal, one per symmetric yaw."""
     above = Pose.from_position_quaternion([0, 0, height]) @ goal
-    return [
-        above @ Pose.from_yaw([0, 0, 0], yaw) @ tcp_from_object.inverse() for yaw in target.symmetric_yaws
-    ]
+    return [above @ Pose.from_yaw([0, 0, 0], yaw) @ tcp_from_object.inverse() for yaw in target.symmetric_yaws]
 
 
 class StackProgram:

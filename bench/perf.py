@@ -190,9 +190,7 @@ print(time.perf_counter() - start)
 
 
 def _process_rows() -> Iterator[Row]:
-    yield row(
-        "second environment in a process", _measured(_MEMORY), "MB", 120.0, "growth of the resident memory"
-    )
+    yield row("second environment in a process", _measured(_MEMORY), "MB", 120.0, "growth of the resident memory")
     seconds = _measured(_IMPORT)
     yield row("import onedemo.envs", seconds, "s", 2.0, "without importing robosuite")
     _measured(_START)

@@ -189,11 +189,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
 
 def _substeps(control_frequency: int) -> int:
     physics = round(1.0 / PHYSICS_DT)
-    if (
-        isinstance(control_frequency, bool)
-        or not isinstance(control_frequency, int)
-        or control_frequency <= 0
-    ):
+    if isinstance(control_frequency, bool) or not isinstance(control_frequency, int) or control_frequency <= 0:
         raise BadOption("control_frequency", f"{control_frequency!r} is not a positive whole number of Hz")
     if physics % control_frequency:
         allowed = ", ".join(str(rate) for rate in range(10, physics + 1) if physics % rate == 0)

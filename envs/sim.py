@@ -118,6 +118,11 @@ def compiled_scene(robot: str, boxes: tuple[Box, ...]) -> Scene:
     return Scene(model, arms, home, np.array(bodies), owner, labels)
 
 
+def robot_arm(robot: str, index: int = 0) -> Arm:
+    """The kinematics of a robot's arm as it stands at the table, tcp between the finger pads."""
+    return compiled_scene(robot, ()).arms[index].arm
+
+
 def _table_env(robot: str, boxes: tuple[Box, ...]):
     """A robosuite environment that is used for its model only."""
     before = logging.root.manager.disable
@@ -302,8 +307,7 @@ class Simulation:
         self._object_dofs = self.model.body_dofadr[self.scene.objects][:, None] + np.arange(3)
         self._widest = [self._measured_opening(arm) for arm in self.scene.arms]
         self._opening_offset = [
-            widest - self._pad_distance(arm)
-            for widest, arm in zip(self._widest, self.scene.arms, strict=True)
+            widest - self._pad_distance(arm) for widest, arm in zip(self._widest, self.scene.arms, strict=True)
         ]
 
     def reset(self, joints: np.ndarray, object_poses: np.ndarray) -> None:

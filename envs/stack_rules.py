@@ -149,9 +149,7 @@ def allowed_contact(pair: tuple[int, int], progress: StackProgress) -> bool:
     return block - (low - FIRST_OBJECT) == 1
 
 
-def shaped(
-    poses: list[list[float]], goals: list[list[float]], tcp: list[float], progress: StackProgress
-) -> float:
+def shaped(poses: list[list[float]], goals: list[list[float]], tcp: list[float], progress: StackProgress) -> float:
     """Dense reward in [0, 1]: the share of blocks placed, and of the current one reached, grasped and carried."""
     if progress.placed == progress.n_blocks:
         return 1.0

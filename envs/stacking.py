@@ -177,9 +177,7 @@ def _check_places(poses: np.ndarray, base: np.ndarray) -> None:
     """Refuse blocks off the table or inside each other, and a base place off the table or tilted."""
     for k, pose in enumerate(poses):
         if np.abs(pose[:2]).max() > TABLE_EDGE or pose[2] < TABLE_HEIGHT + 0.4 * BLOCK_SIZE[2]:
-            raise BadOption(
-                "object_poses", f"block {k} at {np.round(pose[:3], 3).tolist()} is not on the table"
-            )
+            raise BadOption("object_poses", f"block {k} at {np.round(pose[:3], 3).tolist()} is not on the table")
         for j in range(k):
             apart = poses[j, :3] - pose[:3]
             if np.hypot(*apart[:2]) < BLOCK and abs(apart[2]) < 0.9 * BLOCK_SIZE[2]:

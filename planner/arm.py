@@ -59,9 +59,7 @@ class Arm:
             object.__setattr__(self, key, value)
         if not np.isfinite(self.chain).all() or np.abs(self.chain).max() > 100.0:
             raise BadModel(self.name, "chain", "holds a number that is not finite or above 100 m")
-        for name, low, high, speed in zip(
-            self.joint_names, self.lower, self.upper, self.velocity_limits, strict=True
-        ):
+        for name, low, high, speed in zip(self.joint_names, self.lower, self.upper, self.velocity_limits, strict=True):
             if not low < high:
                 raise BadModel(self.name, name, f"lower limit {low:g} is not below upper limit {high:g}")
             if not 0 < speed < np.inf:

@@ -100,9 +100,7 @@ def _normalize_rows(x, out):
 @kernel
 def _from_pose_rows(p, r, out):
     for i in range(len(out)):
-        screw.store8(
-            out, i, screw.from_pose((p[i, 0], p[i, 1], p[i, 2]), (r[i, 0], r[i, 1], r[i, 2], r[i, 3]))
-        )
+        screw.store8(out, i, screw.from_pose((p[i, 0], p[i, 1], p[i, 2]), (r[i, 0], r[i, 1], r[i, 2], r[i, 3])))
 
 
 @kernel
@@ -266,9 +264,7 @@ def hamilton_minus(b: ArrayLike) -> Array:
 def _hamilton(x: ArrayLike, sign: float) -> Array:
     def block(w: float, i: float, j: float, k: float) -> Array:
         s = sign
-        return np.array(
-            [[w, -i, -j, -k], [i, w, -s * k, s * j], [j, s * k, w, -s * i], [k, -s * j, s * i, w]]
-        )
+        return np.array([[w, -i, -j, -k], [i, w, -s * k, s * j], [j, s * k, w, -s * i], [k, -s * j, s * i, w]])
 
     x = _rows("dual quaternion", x, 8)
     out = np.zeros((8, 8))

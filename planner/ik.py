@@ -48,9 +48,7 @@ def _margins(chain, limits, path, q, settings, work, qdot, margins):
             margins[k] = min(margins[k], q[i] - limits[0, i], limits[1, i] - q[i])
 
 
-def inverse_kinematics(
-    arm: Arm, target: Pose, seed: ArrayLike, *, iterations: int = 300
-) -> np.ndarray | None:
+def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: int = 300) -> np.ndarray | None:
     """Joints (dof,) that reach the pose within 0.1 mm and 1 mrad from a seed (dof,), or None.
 
     Local: another seed may lead to another posture, or succeed where this one fails.

@@ -41,9 +41,7 @@ class MotionSettings:
 
     def __post_init__(self):
         if not 0.0 <= self.guide <= self.max_guide <= 1.0:
-            raise BadOption(
-                "guide", f"need 0 <= guide <= max_guide <= 1, got {self.guide} and {self.max_guide}"
-            )
+            raise BadOption("guide", f"need 0 <= guide <= max_guide <= 1, got {self.guide} and {self.max_guide}")
         for name in ("departure", "min_margin"):
             if getattr(self, name) < 0.0:
                 raise BadOption(name, f"{getattr(self, name)} is negative")

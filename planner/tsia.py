@@ -133,7 +133,5 @@ def reachable_guide(
     bad = np.flatnonzero(margins(path[first:]) < min_margin)
     guide = first + (int(bad[-1]) + 1 if len(bad) else 0)
     if guide > last:
-        raise PlanFailed(
-            "ik_or_limit", f"the imitated path cannot be reached behind {guide / len(path):.0%} of it"
-        )
+        raise PlanFailed("ik_or_limit", f"the imitated path cannot be reached behind {guide / len(path):.0%} of it")
     return guide

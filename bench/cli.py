@@ -1,0 +1,91 @@
+"""The command `onedemo`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import demo_commands
+from .console import console
+
+USAGE_ERROR = 2
+app = typer.Typer(
+    help="One demonstration in, a robot policy out, and a benchmark that proves it.\n\nStart with: onedemo run stack",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+app.add_typer(demo_commands.app, name="demo")
+
+
+@app.command()
+def run(
+    config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped config, like stack.")],
+    overrides: Annotated[
+        list[str] | None, typer.Argument(metavar="[KEY=VALUE]...", help="Changes to the config.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Where run folders are made.")] = Path("runs"),
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Run episodes of a config and write a report, a figure and a video.
+
+    Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, n_blocks, max_seconds,
+    video, settings. Keys with dots reach into settings: settings.motion.guide=0.2
+
+    Finished episodes are kept: running the same config again goes on where it stopped. The last line on
+    standard output is the run folder.
+
+    Examples:
+    onedemo run stack
+
+    onedemo run configs/bench/stack.yaml episodes=50 level=L2 seed=1000
+    """
+    from .run import run_config
+
+    raise typer.Exit(run_config(config, overrides or [], output, quiet=quiet))
+
+
+@app.command()
+def perf(
+    json: Annotated[Path | None, typer.Option("--json", help="Also write the rows to this file.")] = None,
+    only: Annotated[str, typer.Option("--only", help="Part of a line's name, or a shell pattern.")] = "*",
+) -> None:
+    """Measure speeds, as ratios within one run: machines differ and are shared.
+
+    A line is well when its value is at most its goal. Peers that are not installed are skipped:
+    pip install 'onedemo\\[peers]'
+
+    Example: onedemo perf --only controller --json perf.json
+    """
+    from .perf import run_perf
+
+    raise typer.Exit(run_perf(only, json))
+
+
+@app.command()
+def version() -> None:
+    """Print the version."""
+    from importlib.metadata import version as installed
+
+    console().print(installed("onedemo"))
+
+
+def main() -> None:
+    """Entry point: errors of the project become one line and exit code 2."""
+    from ..planner.errors import OneDemoError
+
+    try:
+        app()
+    except OneDemoError as error:
+        console(stderr=True).print(f"[red]error[/red]  {_plain(str(error))}", soft_wrap=True)
+        sys.exit(USAGE_ERROR)
+
+
+def _plain(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)

@@ -1,0 +1,133 @@
+"""`onedemo demo …`: look at a demonstration, make one from a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .console import console
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ..planner.demo import Demonstration
+
+app = typer.Typer(
+    help="Look at a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="rich"
+)
+
+
+@app.command()
+def check(
+    file: Annotated[str, typer.Argument(help="A demonstration (.npz), or the name of a shipped one, like stack.")],
+) -> None:
+    """Validate a demonstration and say what is in it.
+
+    Prints duration, samples, the segments with the screw that each amounts to, source, licence, and warnings
+    about what a careful reader would want to know. Exits with 2 and one line if the file cannot be used.
+
+    Example: onedemo demo check stack
+    """
+    from ..planner.demo import warnings_of
+    from ..planner.demo_io import UNITS, load_demonstration
+
+    path = demonstration_path(file)
+    demo = load_demonstration(path)
+    out = console()
+    out.print(f"[bold]{demo.name}[/bold]  {demo.source} {demo.robot}, task {demo.task or '-'}")
+    out.print(f"  file      {path}", soft_wrap=True)
+    out.print(f"  length    {demo.duration:.2f} s, {len(demo.path)} samples, {demo.path.lengths()[-1]:.2f} m (screw)")
+    out.print(f"  tool      {demo.tcp_frame}, units {UNITS}")
+    out.print(f"  joints    {'recorded' if demo.joint_positions is not None else 'not recorded'}")
+    out.print(f"  licence   {demo.licence}")
+    if demo.segments:
+        out.print(_segment_table(demo))
+    warnings = warnings_of(demo)
+    for warning in warnings:
+        out.print(f"[yellow]warning[/yellow]  {warning}")
+    out.print("[green]ok[/green]" if not warnings else f"[green]ok[/green], with {len(warnings)} warnings")
+
+
+@app.command("import")
+def import_(
+    raw: Annotated[Path, typer.Argument(help="The recording: .npz of a robosuite teleoperation, or .npy/.csv poses.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The demonstration to write (.npz).")],
+    name: Annotated[str, typer.Option(help="Its name; default: the output file's.")] = "",
+    robot: Annotated[str, typer.Option(help="Whose hand moved.")] = "Panda",
+    licence: Annotated[str, typer.Option(help="Licence of the data.")] = "unknown",
+    source: Annotated[str, typer.Option(help="Poses only: teleoperated, kinesthetic or scripted.")] = "kinesthetic",
+    units: Annotated[str, typer.Option(help="Poses only: m, cm or mm.")] = "m",
+    quaternion: Annotated[str, typer.Option(help="Poses only: order of the columns, wxyz or xyzw.")] = "wxyz",
+    rate: Annotated[float, typer.Option(help="Poses only: samples per second.")] = 0.0,
+) -> None:
+    """Make a demonstration from a recording.
+
+    A robosuite teleoperation (.npz with t, q, actions, obj_cubeA_jnt0, obj_cubeB_jnt0) goes through the robot's
+    forward kinematics and is cut where the gripper moves. Rows of poses (.npy or .csv: x y z and a quaternion)
+    are cut where the hand rests.
+
+    Examples:
+    onedemo demo import panda_teleop_stack.npz --output stack.npz --licence MIT
+
+    onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100
+    """
+    from ..planner.demo_io import save_demonstration
+    from ..planner.recordings import from_pose_table, stack_from_teleoperation
+
+    title = name or output.stem
+    if raw.suffix == ".npz":
+        from ..envs.sim import robot_arm
+
+        demo = stack_from_teleoperation(raw, robot_arm(robot), name=title, licence=licence)
+    else:
+        demo = from_pose_table(
+            raw,
+            name=title,
+            robot=robot,
+            rate=rate,
+            units=units,
+            quaternion=quaternion,
+            source=source,
+            licence=licence,
+        )
+    save_demonstration(demo, output)
+    console().print(f"wrote {output}: {len(demo.path)} samples, {len(demo.segments)} segments", soft_wrap=True)
+
+
+def demonstration_path(name: str) -> Path:
+    """The file itself if there is one of that name, else the shipped demonstration."""
+    from ..configs.shipped import shipped_demonstration
+
+    path = Path(name)
+    looks_like_a_file = path.suffix or path.exists() or len(path.parts) > 1
+    return path if looks_like_a_file else shipped_demonstration(name)
+
+
+def _segment_table(demo: Demonstration) -> Table:
+    import numpy as np
+    from rich.table import Table
+
+    from ..planner.dualquat import screw_parameters
+
+    table = Table(title="segments; screw = the motion from first to last pose, in the world", title_justify="left")
+    for title in ("name", "samples", "relative to", "holds", "then", "screw axis", "angle", "along it", "pitch"):
+        table.add_column(title, justify="left" if title in ("name", "relative to", "holds", "then") else "right")
+    for segment in demo.segments:
+        first, last = demo.path[segment.start], demo.path[segment.stop]
+        screw = screw_parameters((last @ first.inverse()).dq)
+        axis = " ".join(f"{value:+.2f}" for value in screw.axis)
+        pitch = f"{screw.pitch:+.3f} m/rad" if np.isfinite(screw.pitch) else "pure slide"
+        table.add_row(
+            segment.name,
+            f"{segment.start}-{segment.stop}",
+            segment.reference or "world",
+            segment.held or "-",
+            segment.gripper,
+            axis,
+            f"{np.degrees(screw.angle):.1f} deg",
+            f"{screw.travel:+.3f} m",
+            pitch,
+        )
+    return table

@@ -1,0 +1,135 @@
+"""What a run says: one row of numbers, and a report that can be read on its own."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from ..configs.schema import RunConfig
+from .records import EpisodeRecord
+from .statistics import median, quantile, wilson
+
+
+def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
+    """The numbers of one cell: method, task, robot, level and what came of it."""
+    successes = sum(record.success for record in records)
+    low, high = wilson(successes, len(records))
+    worst = [1e3 * max(record.position_error) for record in records if record.success]
+    return {
+        "method": config.method,
+        "task": config.task,
+        "robot": config.robot,
+        "level": config.level,
+        "episodes": len(records),
+        "successes": successes,
+        "safe_successes": sum(record.safe_success for record in records),
+        "wilson_low": round(low, 4),
+        "wilson_high": round(high, 4),
+        "seconds_median": median([record.seconds for record in records]),
+        "seconds_max": max((record.seconds for record in records), default=float("nan")),
+        "position_error_mm_median": median(worst),
+        "position_error_mm_max": max(worst, default=float("nan")),
+        "tick_us_median": median([record.tick_us[0] for record in records]),
+        "tick_us_p99": median([record.tick_us[1] for record in records]),
+        "tick_us_max": max((record.tick_us[2] for record in records), default=float("nan")),
+        "failures": dict(Counter(record.failure_reason for record in records if not record.success)),
+    }
+
+
+def verdict(row: dict[str, Any]) -> list[str]:
+    """Three lines for the terminal and the top of the report."""
+    failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
+    return [
+        f"{row['successes']} of {row['episodes']} succeeded at {row['level']} "
+        f"(Wilson 95 %: {row['wilson_low']:.2f} to {row['wilson_high']:.2f}), "
+        f"{row['safe_successes']} without any unwanted contact",
+        f"{row['seconds_median']:.1f} s simulated per episode (median), "
+        f"largest position error {row['position_error_mm_max']:.1f} mm in the successes",
+        f"planner {row['tick_us_median']:.0f} us per tick (median), {row['tick_us_p99']:.0f} us (p99); failures: {failures}",
+    ]
+
+
+def write_summary(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The rows as `{"rows": [...]}`."""
+    path.write_text(json.dumps({"rows": rows}, indent=2) + "\n", encoding="utf-8")
+
+
+def report_text(
+    config: RunConfig, records: list[EpisodeRecord], row: dict[str, Any], notes: list[str], command: str
+) -> str:
+    """The report as Markdown."""
+    parts = [
+        f"# {config.name}: {config.method} on {config.task}, {config.robot}, {config.level}",
+        "\n".join(f"- {line}" for line in verdict(row)),
+        _table(row),
+        _failures([record for record in records if not record.success], config),
+        _unsafe([record for record in records if record.success and not record.safe]),
+        "## Stage reached\n\n" + _stages(records),
+        "## Planner time\n\n" + _times(records),
+        "## One episode\n\n" + "\n\n".join(notes),
+        f"## How to repeat it\n\n```\n{command}\n```\n\n"
+        "Versions are in `environment.json`, the whole config in `config.yaml`, every episode in `episodes.jsonl`.",
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _table(row: dict[str, Any]) -> str:
+    head = "| method | task | robot | level | episodes | success | safe success | Wilson 95 % | time [s] | error [mm] |"
+    line = "|---|---|---|---|---|---|---|---|---|---|"
+    cells = (
+        row["method"],
+        row["task"],
+        row["robot"],
+        row["level"],
+        row["episodes"],
+        row["successes"],
+        row["safe_successes"],
+        f"{row['wilson_low']:.2f} to {row['wilson_high']:.2f}",
+        f"{row['seconds_median']:.1f} (max {row['seconds_max']:.1f})",
+        f"{row['position_error_mm_median']:.1f} (max {row['position_error_mm_max']:.1f})",
+    )
+    return "\n".join([head, line, "| " + " | ".join(_cell(cell) for cell in cells) + " |"])
+
+
+def _failures(records: list[EpisodeRecord], config: RunConfig) -> str:
+    if not records:
+        return "## Failures\n\nNone."
+    rows = ["| scenario | seed | reason | stage | explanation |", "|---|---|---|---|---|"]
+    for record in records:
+        cells = (record.index, record.seed, record.failure_reason, record.stage, record.detail)
+        rows.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+    again = f"To see one: `onedemo run {config.name} seed=SEED episodes=1 level={config.level}`."
+    return "## Failures\n\n" + "\n".join(rows) + "\n\n" + again
+
+
+def _unsafe(records: list[EpisodeRecord]) -> str:
+    if not records:
+        return ""
+    lines = [f"- seed {record.seed}: {_cell(record.collision)}" for record in records]
+    return "## Successes with an unwanted contact\n\n" + "\n".join(lines)
+
+
+def _stages(records: list[EpisodeRecord]) -> str:
+    counts = Counter(record.stage for record in records)
+    return "\n".join(f"- {_cell(stage)}: {count}" for stage, count in counts.most_common())
+
+
+def _times(records: list[EpisodeRecord]) -> str:
+    median_us, p99, largest = zip(*(record.tick_us for record in records), strict=True)
+    rate = median([record.seconds / record.wall_seconds for record in records])
+    return (
+        f"Per tick of 20 ms, as called from Python: median {median(median_us):.0f} us, 99th percentile "
+        f"{quantile(p99, 0.5):.0f} us (medians over episodes); the longest tick {max(largest) / 1e3:.1f} ms, in which a "
+        f"motion is planned with all its symmetric goals. An episode runs {rate:.0f} times faster than real time, "
+        "physics included."
+    )
+
+
+def _cell(value: Any) -> str:
+    """Text that can neither break a table nor become markup."""
+    text = " ".join(str(value).split())
+    for character in "\\|<>[]`*":
+        text = text.replace(character, f"\\{character}")
+    return text[:300]

@@ -1,0 +1,190 @@
+"""`onedemo run`: a config in, a run folder out; interrupted runs go on where they stopped."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..configs.schema import RunConfig, load_config
+from ..configs.shipped import shipped_config
+from ..planner.errors import BadConfig
+from .console import console
+from .demo_commands import demonstration_path
+from .records import FILE, EpisodeRecord, RecordWriter, locked, read_records
+from .scenarios import scenarios_of
+
+if TYPE_CHECKING:
+    from ..baselines.policy import Policy
+
+DISK_FULL, INTERRUPTED = 3, 130
+IDS = {"stack": "onedemo/Stack-v0"}
+
+
+def run_config(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
+    """Run a config and write its folder; returns the exit code.
+
+    Raises:
+        BadConfig: the config, an override or the demonstration cannot be used.
+        RunBusy: another process writes into the same folder.
+    """
+    source = config_path(config)
+    settings = load_config(source, overrides)
+    folder = output / f"{settings.name}-{settings.digest()}"
+    err = console(stderr=True, quiet=quiet)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with locked(folder):
+            lines = _run(settings, source, folder, " ".join(["onedemo run", config, *overrides]), err)
+    except KeyboardInterrupt:
+        err.print(f"stopped; finished episodes are kept in {folder}, running the same again goes on", soft_wrap=True)
+        return INTERRUPTED
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        console(stderr=True).print(
+            f"[red]error[/red]  {folder}: {reason}; finished episodes are kept, running the same again goes on",
+            soft_wrap=True,
+        )
+        return DISK_FULL
+    out = console(quiet=quiet)
+    for line in lines:
+        out.print(line, soft_wrap=True)
+    console().print(str(folder), soft_wrap=True, markup=False)
+    return 0
+
+
+def config_path(config: str) -> Path:
+    """The file itself, or the shipped config of that name, also for a path as it stands in the source tree."""
+    path = Path(config)
+    if path.exists():
+        return path
+    if path.suffix in ("", ".yaml") and str(path.parent) in (".", "configs/bench"):
+        return shipped_config(path.stem)
+    raise BadConfig(path, "", "no such file")
+
+
+def _run(config: RunConfig, source: Path, folder: Path, command: str, err: Any) -> list[str]:
+    env, policy = _prepared(config, source)
+    try:
+        _describe(config, folder)
+        records = _episodes(env, policy, config, folder, err)
+        return _report(env, policy, config, folder, records, command, err)
+    finally:
+        env.close()
+
+
+def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
+    """The environment and the policy; what the config names wrongly becomes a BadConfig with its key."""
+    import gymnasium as gym
+
+    from .. import envs  # noqa: F401  (registers the ids)
+    from ..baselines.factory import make_policy
+    from ..planner.demo_io import load_demonstration
+
+    if config.task not in IDS:
+        raise BadConfig(source, "task", f"unknown task {config.task!r}; known: {', '.join(IDS)}")
+    demonstration = load_demonstration(demonstration_path(config.demonstration))
+    _check_names(config, source)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        env = gym.make(
+            IDS[config.task],
+            robot=config.robot,
+            level=config.level,
+            n_blocks=config.n_blocks,
+            render_mode="rgb_array" if config.video else None,
+            max_episode_steps=max(1, round(config.max_seconds * 50)),
+        )
+    return env, make_policy(config.method, env.unwrapped.task, demonstration, config.settings)
+
+
+def _check_names(config: RunConfig, source: Path) -> None:
+    from ..baselines.factory import POLICIES
+    from ..envs.layouts import LEVELS
+    from ..envs.sim import ROBOTS
+
+    for key, known in (("level", LEVELS), ("robot", ROBOTS), ("method", POLICIES)):
+        value = getattr(config, key)
+        if value not in known:
+            raise BadConfig(source, key, f"unknown {key} {value!r}; known: {', '.join(known)}")
+
+
+def _describe(config: RunConfig, folder: Path) -> None:
+    """Write what the run is; refuse a folder that holds another one."""
+    from ruamel.yaml import YAML
+
+    from .environment import fingerprint
+
+    described = {"digest": config.digest(), "scenarios": [asdict(scenario) for scenario in scenarios_of(config)]}
+    file = folder / "scenarios.json"
+    if file.exists() and json.loads(file.read_text(encoding="utf-8")).get("digest") != config.digest():
+        raise BadConfig(file, "digest", "the folder belongs to another config; choose another --output")
+    file.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
+    with (folder / "config.yaml").open("w", encoding="utf-8") as stream:
+        YAML(typ="safe", pure=True).dump(config.model_dump(mode="json"), stream)
+    text = json.dumps(fingerprint(), indent=2) + "\n"
+    (folder / "environment.json").write_text(text, encoding="utf-8")
+
+
+def _episodes(env: Any, policy: Policy, config: RunConfig, folder: Path, err: Any) -> list[EpisodeRecord]:
+    """Run what is missing; all records, in order."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from .episode import run_episode
+
+    file = folder / FILE
+    known, foreign = read_records(file)
+    for number in foreign:
+        err.print(f"[yellow]warning[/yellow]  {file}, line {number}: not an episode record, skipped", soft_wrap=True)
+    records = {record.index: record for record in known if record.index < config.episodes}
+    todo = [scenario for scenario in scenarios_of(config) if scenario.index not in records]
+    if records:
+        err.print(f"{len(records)} of {config.episodes} episodes were done before")
+    writer = RecordWriter(file)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    try:
+        with Progress(*columns, console=err, transient=True) as progress:
+            bar = progress.add_task(f"{config.name} {config.level}", total=config.episodes, completed=len(records))
+            for scenario in todo:
+                record, _ = run_episode(env, policy, scenario, config)
+                writer.append(record)
+                records[record.index] = record
+                successes = sum(done.success for done in records.values())
+                text = f"{config.name} {config.level}  {successes}/{len(records)} succeeded"
+                progress.update(bar, advance=1, description=text)
+    finally:
+        writer.close()
+    return [records[index] for index in sorted(records)]
+
+
+def _report(
+    env: Any, policy: Policy, config: RunConfig, folder: Path, records: list[EpisodeRecord], command: str, err: Any
+) -> list[str]:
+    """Figure, video, report and summary; the lines for the terminal."""
+    from .figures import draw_episode
+    from .report import report_text, summary_row, verdict, write_summary
+    from .showcase import watch
+
+    figure, video = folder / "episode0.png", folder / "episode0.mp4"
+    with err.status("drawing the first episode"):
+        seen = watch(env, policy, scenarios_of(config)[0], config, video if config.video else None)
+        title = f"{config.task}, {config.robot}, {config.level}, seed {config.seed}: one demonstration, {config.method}"
+        draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
+    row = summary_row(config, records)
+    write_summary(folder / "summary.json", [row])
+    notes = [
+        f"![demonstration, final paths and executed path]({figure.name})",
+        "Blue: the demonstration where it was given. Magenta: the final paths. Dashed: the executed path.",
+    ]
+    lines = [*verdict(row), f"report  {folder / 'report.md'}", f"figure  {figure}"]
+    if seen.video_problem:
+        notes.append(f"No video: {seen.video_problem}.")
+        lines.append(f"no video: {seen.video_problem}")
+    elif config.video:
+        notes.append(f"Video, {seen.speed:.0f} times as fast as the simulation: [{video.name}]({video.name})")
+        lines.append(f"video   {video}")
+    text = report_text(config, records, row, notes, command)
+    (folder / "report.md").write_text(text, encoding="utf-8")
+    return lines

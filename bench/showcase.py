@@ -1,0 +1,104 @@
+"""The first episode once more, watched: what the figure and the video are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..baselines.policy import LabeledPath, Policy
+from ..configs.schema import RunConfig
+from ..envs.task import TaskObject
+from ..planner.errors import RenderingUnavailable
+from .episode import run_episode
+from .scenarios import Scenario
+
+EVERY = 4
+"""Control steps per picture."""
+FRAMES_PER_SECOND = 25
+
+
+@dataclass
+class Showcase:
+    """What was seen of an episode.
+
+    Attributes:
+        objects: what was moved.
+        table_height: [m].
+        start: (n, 7) object poses at the start.
+        goals: (n, 7) where they had to end.
+        end: (n, 7) object poses at the end.
+        executed: (steps + 1, 3) the tcp [m].
+        paths: what the policy planned.
+        speed: how much faster than reality the video plays.
+        video_problem: "" or why there is no video.
+    """
+
+    objects: tuple[TaskObject, ...]
+    table_height: float
+    start: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
+    goals: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
+    end: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
+    executed: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    paths: tuple[LabeledPath, ...] = ()
+    speed: float = 1.0
+    video_problem: str = ""
+
+
+def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video: Path | None) -> Showcase:
+    """Run a scenario and keep what was seen; write the video on the way, if one is wanted and can be drawn."""
+    task = env.unwrapped.task
+    seen = Showcase(task.objects, task.table_height)
+    tcp: list[np.ndarray] = []
+    film = Film(video) if video else None
+
+    def observer(env: Any, observation: dict[str, np.ndarray]) -> None:
+        if not tcp:
+            seen.start, seen.goals = observation["object_pose"], observation["goal_pose"]
+        tcp.append(observation["tcp_pose"][0, :3])
+        seen.end = observation["object_pose"]
+        if film and len(tcp) % EVERY == 1:
+            film.take(env)
+
+    try:
+        _, report = run_episode(env, policy, scenario, config, observer)
+    finally:
+        if film:
+            film.close()
+    seen.executed, seen.paths = np.array(tcp), report.paths
+    seen.speed = FRAMES_PER_SECOND * EVERY * env.unwrapped.control_dt
+    seen.video_problem = film.problem if film else ""
+    return seen
+
+
+class Film:
+    """An mp4 that is written picture by picture; it appears under its name only when it is complete."""
+
+    def __init__(self, path: Path):
+        self._path, self._part = path, path.with_suffix(".part.mp4")
+        self._writer: Any = None
+        self.problem = ""
+
+    def take(self, env: Any) -> None:
+        """Add a picture, unless drawing has turned out to be impossible."""
+        if self.problem:
+            return
+        try:
+            picture = env.render()
+        except RenderingUnavailable as error:
+            self.problem = str(error)
+            return
+        if self._writer is None:
+            import imageio
+
+            options = {"fps": FRAMES_PER_SECOND, "codec": "libx264", "quality": 7, "macro_block_size": 8}
+            self._writer = imageio.get_writer(self._part, format="FFMPEG", **options)
+        self._writer.append_data(picture)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            self._writer.close()
+            self._part.replace(self._path)

@@ -1,0 +1,34 @@
+"""The files that are installed with the package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..planner.errors import UnknownName
+
+FOLDER = Path(__file__).parent
+
+
+def _shipped(kind: str, folder: str, suffix: str, name: str) -> Path:
+    known = {path.stem: path for path in sorted((FOLDER / folder).glob(f"*{suffix}"))}
+    if name not in known:
+        raise UnknownName(kind, name, known)
+    return known[name]
+
+
+def shipped_demonstration(name: str) -> Path:
+    """File of a demonstration that comes with the package, like "stack".
+
+    Raises:
+        UnknownName: there is none of that name; the message lists them.
+    """
+    return _shipped("demonstration", "demos", ".npz", name)
+
+
+def shipped_config(name: str) -> Path:
+    """File of a benchmark config that comes with the package, like "stack".
+
+    Raises:
+        UnknownName: there is none of that name; the message lists them.
+    """
+    return _shipped("config", "bench", ".yaml", name)
