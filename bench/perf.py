@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .console import console
+
 BATCHES = 15
 BATCH_SECONDS = 0.02
 
@@ -223,3 +225,24 @@ def measure(pattern: str = "*") -> Iterator[Row]:
 def write_json(rows: list[Row], path: Path) -> None:
     """The lines as `{"rows": [...]}`."""
     path.write_text(json.dumps({"rows": [asdict(line) for line in rows]}, indent=2) + "\n")
+
+
+def run_perf(pattern: str, json_file: Path | None) -> int:
+    """Measure and print a table; exit code 1 if a bar is missed."""
+    from rich.table import Table
+
+    table = Table(title="speeds; a line is well when its value is at most its goal", title_justify="left")
+    for title, justify in (("line", "left"), ("value", "right"), ("goal", "right"), ("", "left"), ("note", "left")):
+        table.add_column(title, justify=justify)
+    rows = []
+    with console(stderr=True).status("measuring"):
+        for line in measure(pattern):
+            rows.append(line)
+            value = "-" if line.value is None else f"{line.value:.3g} {line.unit}"
+            goal = "-" if line.goal is None else f"{line.goal:.3g}"
+            verdict = {True: "[green]ok[/green]", False: "[red]missed[/red]", None: "-"}[line.ok]
+            table.add_row(line.name, value, goal, verdict, line.note)
+    console().print(table)
+    if json_file is not None:
+        write_json(rows, json_file)
+    return 1 if any(line.ok is False for line in rows) else 0

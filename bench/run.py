@@ -66,7 +66,8 @@ def config_path(config: str) -> Path:
 
 
 def _run(config: RunConfig, source: Path, folder: Path, command: str, err: Any) -> list[str]:
-    env, policy = _prepared(config, source)
+    with err.status("building the scene and the planner (compiled on first use: about half a minute)"):
+        env, policy = _prepared(config, source)
     try:
         _describe(config, folder)
         records = _episodes(env, policy, config, folder, err)
@@ -82,6 +83,7 @@ def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
     from .. import envs  # noqa: F401  (registers the ids)
     from ..baselines.factory import make_policy
     from ..planner.demo_io import load_demonstration
+    from ..planner.motions import warm_up
 
     if config.task not in IDS:
         raise BadConfig(source, "task", f"unknown task {config.task!r}; known: {', '.join(IDS)}")
@@ -97,7 +99,10 @@ def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
             render_mode="rgb_array" if config.video else None,
             max_episode_steps=max(1, round(config.max_seconds * 50)),
         )
-    return env, make_policy(config.method, env.unwrapped.task, demonstration, config.settings)
+    task = env.unwrapped.task
+    for arm in task.arms:
+        warm_up(arm)
+    return env, make_policy(config.method, task, demonstration, config.settings)
 
 
 def _check_names(config: RunConfig, source: Path) -> None:

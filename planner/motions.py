@@ -164,3 +164,13 @@ def _rolled_out(
         before.seconds + after.seconds,
         before.reason or after.reason,
     )
+
+
+def warm_up(arm: Arm) -> None:
+    """Compile, or load from the cache, everything that a motion may need, so that no tick has to wait for it."""
+    q = 0.5 * (np.where(np.isfinite(arm.lower), arm.lower, -1.0) + np.where(np.isfinite(arm.upper), arm.upper, 1.0))
+    start = arm.fk(q)
+    path = screw_path(start, Pose.from_position_quaternion([0.0, 0.0, 0.02]) @ start, 0.005)
+    # a margin that no arm has makes every branch run
+    plan_motion(arm, q, path, path[-1], MotionSettings(min_margin=100.0), leaving=path)
+    follow(arm, path, MotionSettings()).step(q)
