@@ -95,6 +95,7 @@ def _peer_tick_row(ours: Callable[[], object], q: np.ndarray, target: np.ndarray
     try:
         import dqrobotics as peer
         from dqrobotics.robots import FrankaEmikaPandaRobot
+        from dqrobotics.utils.DQ_LinearAlgebra import pinv
     except ImportError:
         yield Row(name, None, "ratio", goal, None, "needs: pip install 'onedemo[peers]'")
         return
@@ -105,7 +106,7 @@ def _peer_tick_row(ours: Callable[[], object], q: np.ndarray, target: np.ndarray
         """The same law with the peer's own algebra, pseudo-inverse and null-space projection included."""
         error = (one - peer.conj(robot.fkm(q)) * goal_pose).vec8()
         n = peer.haminus8(goal_pose) @ c8 @ robot.pose_jacobian(q)
-        inverse = peer.pinv(n)
+        inverse = pinv(n)
         return inverse @ (15.0 * error) + pull - inverse @ (n @ pull)
 
     mine, peers = seconds_per_call(ours, theirs)

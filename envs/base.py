@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
@@ -13,6 +14,7 @@ from ..planner.pose import Pose
 from . import spaces as space
 from .render import Ghost, Renderer
 from .sim import PHYSICS_DT, Box, Simulation
+from .state import State
 from .task import TaskDescription
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
@@ -62,9 +64,6 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         self.action_space = space.action_space(entries, len(self.arms))
         self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
         self._renderer: Renderer | None = None
-        self._tcp_hemisphere = np.stack(
-            [arm.fk(q).quaternion for arm, q in zip(self.arms, self.sim.scene.home, strict=True)]
-        )
 
     @property
     @abstractmethod
@@ -81,7 +80,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         """Joints (n_arms, dof) and object poses (n, 7) of a new episode; sets the task's own state."""
 
     @abstractmethod
-    def _judge(self) -> tuple[float, bool, dict[str, Any]]:
+    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
         """Reward, terminated and info of the state just reached."""
 
     @abstractmethod
@@ -95,9 +94,10 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         super().reset(seed=seed)
         joints, poses = self._start(dict(options or {}))
         self.sim.reset(joints, poses)
-        _, _, info = self._judge()
+        state = self.sim.read()
+        _, _, info = self._judge(state)
         self._show()
-        return self._observation(), info
+        return self._observation(state), info
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step.
@@ -111,9 +111,10 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         else:
             speeds = self._resolved(rows)
         self.sim.step(speeds, rows[:, -1], self.substeps)
-        reward, terminated, info = self._judge()
+        state = self.sim.read()
+        reward, terminated, info = self._judge(state)
         self._show()
-        return self._observation(), reward, terminated, False, info
+        return self._observation(state), reward, terminated, False, info
 
     def render(self) -> np.ndarray | None:
         """An image (height, width, 3) uint8 in the mode "rgb_array"; OpenGL is opened by the first call."""
@@ -142,7 +143,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         action = np.asarray(action, dtype=np.float64)
         if action.shape != self.action_space.shape:
             raise BadAction(f"has shape {action.shape}; expected {self.action_space.shape}")
-        if not np.isfinite(action).all():
+        if not math.isfinite(action.sum()):
             raise BadAction(f"entry {int(np.argmin(np.isfinite(action)))} is not finite")
         return np.minimum(np.maximum(action, -1.0), 1.0)
 
@@ -158,33 +159,17 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             speeds.append(wanted / max(1.0, float((np.abs(wanted) / arm.velocity_limits).max())))
         return np.array(speeds)
 
-    def _observation(self) -> Observation:
+    def _observation(self, state: State) -> Observation:
         goals, motion = self._goals()
         return {
-            "joint_positions": self.sim.joint_positions(),
-            "joint_velocities": self.sim.joint_velocities(),
-            "tcp_pose": self._tcp_poses(),
-            "gripper_opening": np.array([self.sim.opening(k) for k in range(len(self.arms))]),
-            "object_pose": self._object_poses(),
+            "joint_positions": state.joint_positions,
+            "joint_velocities": state.joint_velocities,
+            "tcp_pose": state.tcp_pose,
+            "gripper_opening": state.gripper_opening,
+            "object_pose": state.object_pose,
             "goal_pose": goals,
             "motion_index": np.array([motion]),
         }
-
-    def _tcp_poses(self) -> np.ndarray:
-        """(n_arms, 7); the quaternion's sign is the one nearer to the home pose."""
-        poses = np.empty((len(self.arms), 7))
-        for k, home in enumerate(self._tcp_hemisphere):
-            pose = self.sim.tcp_pose(k)
-            if pose[3:] @ home < 0.0:
-                pose[3:] *= -1.0
-            poses[k] = pose
-        return poses
-
-    def _object_poses(self) -> np.ndarray:
-        """(n_objects, 7) with w >= 0."""
-        poses = self.sim.object_poses()
-        poses[poses[:, 3] < 0.0, 3:] *= -1.0
-        return poses
 
 
 def _substeps(control_frequency: int) -> int:

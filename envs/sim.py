@@ -11,13 +11,14 @@ import copy
 import logging
 from dataclasses import dataclass
 from functools import lru_cache
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import mujoco
 import numpy as np
 
 from ..planner.arm import Arm
 from ..planner.errors import UnknownName
+from .state import State, read_arm, read_objects
 
 PHYSICS_DT = 0.002
 TABLE_HEIGHT = 0.8
@@ -172,6 +173,7 @@ def _table_env(robot: str, boxes: tuple[Box, ...]):
             self.boxes = [wooden(box) for box in boxes]
             self.model = ManipulationTask(arena, [robot_model], self.boxes)
             _use_velocity_servos(self.model.root, set(robot_model.joints))
+            _leave_out_unused(self.model.root)
 
         def reward(self, action=None):
             return 0.0
@@ -217,6 +219,20 @@ def _use_velocity_servos(root: Element, joints: set[str]) -> None:
     for body in root.iter("body"):
         if (body.get("name") or "").startswith(("robot", "gripper")):
             body.set("gravcomp", "1")
+
+
+def _leave_out_unused(root: Element) -> None:
+    """Remove what costs time at every step and says nothing: force sensors, a link touching its own base."""
+    for sensor in root.findall("sensor"):
+        root.remove(sensor)
+    names = [body.get("name") or "" for body in root.iter("body")]
+    contact = root.find("contact")
+    if contact is None:
+        contact = SubElement(root, "contact")
+    for name in names:
+        # MuJoCo leaves out contacts of a link with its parent, but not where the parent is fixed to the world
+        if name.endswith("_link0") and f"{name[:-1]}1" in names:
+            SubElement(contact, "exclude", {"body1": name, "body2": f"{name[:-1]}1"})
 
 
 def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
@@ -302,13 +318,13 @@ class Simulation:
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         self._pair_codes = _pair_codes(self.scene.owner)
-        self._qpos = np.stack([arm.qpos for arm in self.scene.arms])
-        self._qvel = np.stack([arm.qvel for arm in self.scene.arms])
-        self._object_dofs = self.model.body_dofadr[self.scene.objects][:, None] + np.arange(3)
-        self._widest = [self._measured_opening(arm) for arm in self.scene.arms]
-        self._opening_offset = [
-            widest - self._pad_distance(arm) for widest, arm in zip(self._widest, self.scene.arms, strict=True)
-        ]
+        arms, data, model = self.scene.arms, self.data, self.model
+        self._widest = [self._measured_opening(arm) for arm in arms]
+        self._offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
+        self._read_index = [np.array([*arm.qpos, *arm.qvel, arm.site, *arm.pads]) for arm in arms]
+        self._home_side = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
+        self._arm_views = (data.qpos, data.qvel, data.site_xpos, data.site_xmat, data.geom_xpos)
+        self._object_dofs = model.body_dofadr[self.scene.objects]
 
     def reset(self, joints: np.ndarray, object_poses: np.ndarray) -> None:
         """Put everything in place, at rest, with open grippers.
@@ -337,39 +353,20 @@ class Simulation:
                 ctrl[arm.grip] = arm.closed if grip > 0.0 else arm.opened
         mujoco.mj_step(self.model, self.data, substeps)
 
-    def opening(self, index: int) -> float:
-        """Gap between the finger pads of an arm [m]."""
-        return max(0.0, self._pad_distance(self.scene.arms[index]) + self._opening_offset[index])
-
     def widest_opening(self, index: int) -> float:
         """Gap between the finger pads of an open gripper [m]."""
         return self._widest[index]
 
-    def joint_positions(self) -> np.ndarray:
-        """(n_arms, dof) [rad]."""
-        return self.data.qpos[self._qpos]
-
-    def joint_velocities(self) -> np.ndarray:
-        """(n_arms, dof) [rad/s]."""
-        return self.data.qvel[self._qvel]
-
-    def tcp_pose(self, index: int) -> np.ndarray:
-        """(7,) world pose of the tcp of an arm, x y z [m] and wxyz."""
-        site, pose = self.scene.arms[index].site, np.empty(7)
-        pose[:3] = self.data.site_xpos[site]
-        mujoco.mju_mat2Quat(pose[3:], self.data.site_xmat[site])
-        return pose
-
-    def object_poses(self) -> np.ndarray:
-        """(n_objects, 7) world poses, x y z [m] and wxyz."""
-        poses = np.empty((len(self.scene.objects), 7))
-        poses[:, :3] = self.data.xpos[self.scene.objects]
-        poses[:, 3:] = self.data.xquat[self.scene.objects]
-        return poses
-
-    def object_velocities(self) -> np.ndarray:
-        """(n_objects, 3) linear velocities [m/s]."""
-        return self.data.qvel[self._object_dofs]
+    def read(self) -> State:
+        """The state now, in new arrays."""
+        data, count, dof = self.data, len(self.scene.arms), self.scene.arms[0].arm.dof
+        rows = np.empty((count, 2 * dof + 8))
+        for row, index, home, offset in zip(rows, self._read_index, self._home_side, self._offsets, strict=True):
+            read_arm(*self._arm_views, index, home, offset, row)
+        poses, velocities = np.empty((len(self.scene.objects), 7)), np.empty((len(self.scene.objects), 3))
+        read_objects(data.qvel, data.xpos, data.xquat, self.scene.objects, self._object_dofs, poses, velocities)
+        tcp = 2 * dof
+        return State(rows[:, :dof], rows[:, dof:tcp], rows[:, tcp : tcp + 7], rows[:, tcp + 7], poses, velocities)
 
     def contacts(self) -> set[tuple[int, int]]:
         """Who touches whom: pairs of owners, the smaller first.

@@ -13,6 +13,7 @@ from .options import checked_joints, checked_poses
 from .sim import TABLE_HEIGHT, Box
 from .spaces import observation_space
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress, allowed_contact, shaped
+from .state import State
 from .task import TaskDescription, TaskObject
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
@@ -145,15 +146,14 @@ class StackEnv(OneDemoEnv):
     def _goals(self) -> tuple[np.ndarray, float]:
         return self._goal_pose.copy(), self._progress.motion_index
 
-    def _judge(self) -> tuple[float, bool, dict[str, Any]]:
-        sim, progress = self.sim, self._progress
-        poses, goals = sim.object_poses().tolist(), self._goal_lists
-        tcp, touching = sim.data.site_xpos[sim.scene.arms[0].site].tolist(), sim.contacts()
-        progress.update(poses, goals, tcp, touching, sim.object_velocities().tolist())
+    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
+        progress, touching = self._progress, self.sim.contacts()
+        poses, goals, tcp = state.object_pose.tolist(), self._goal_lists, state.tcp_pose[0, :3].tolist()
+        progress.update(poses, goals, tcp, touching, state.object_velocity.tolist())
         for pair in touching:
             if not allowed_contact(pair, progress):
                 progress.collisions += 1
-                progress.collision = sim.contact_name(pair)
+                progress.collision = self.sim.contact_name(pair)
         fallen = min(pose[2] for pose in poses) < TABLE_HEIGHT - 0.05
         if fallen:
             progress.failure = "off_table"
