@@ -8,9 +8,11 @@ Two laws give a task matrix M (6, dof) and a task velocity b (6) with `M qdot = 
   with which the arm runs away. N is 8 x dof of rank 6: with `A = Q R`, `N = A J_b`, it is solved as
   `(R J_b) qdot = gain * Q^T vec e`, which is the same pseudo-inverse without the two zero singular values.
 
-Both end in `qdot = M^T (M M^T + mu^2 I)^-1 b + (I - J_b^+ J_b) z`, then the limits: a joint that would pass
-its position limit is held at the allowed speed and the others take over, then all speeds are scaled together.
-(Not in the paper: a joint that is stopped alone bends the path; see Flacco, De Luca and Khatib 2012.)
+Both end in `qdot = z + M^T (M M^T + mu^2 I)^-1 (b - M z)`: damped least squares of the task, with a pull z to the
+middle of the joint ranges projected on the null space. Near a singularity, where damping would let the projection
+leak, z fades out. Then the limits: a joint that would pass its position limit is held at the allowed speed and the
+others take over, then all speeds are scaled together. (Not in the paper: a joint that is stopped alone bends the
+path; see Flacco, De Luca and Khatib 2012.)
 """
 
 from __future__ import annotations
@@ -23,22 +25,31 @@ from numpy.typing import ArrayLike
 
 from . import screw
 from .arm import Arm
-from .chain import body_jacobian, forward
 from .errors import BadOption
 from .jit import kernel
 from .linear import backward_solve, cholesky, forward_solve, gram, smallest_singular_bound
 from .pose import Pose
+from .workspace import (
+    BASIS,
+    CONTROL,
+    FACTOR,
+    GRAM,
+    JACOBIAN,
+    LIMITS,
+    NEED,
+    NULL,
+    SCRATCH,
+    SOLUTION,
+    TASK,
+    bound,
+    pose_and_jacobian,
+)
 
 LAWS = ("log", "paper")
-NULL_CUT_OFF = 1e-3
-"""Singular value of the Jacobian below which the null-space task rests: it has no projector there."""
 SIGN_HYSTERESIS = 0.1
 """Scalar part of the error beyond which the controller changes to the other way round."""
-
-# Rows of the workspace (ROWS, 16) that the kernels share, so that a tick allocates nothing.
-JACOBIAN, TASK, GRAM, FACTOR, FRAMES, BASIS = 0, 6, 12, 18, 24, 40
-NEED, SOLUTION, NULL, SCRATCH = 46, 47, 48, 49
-ROWS = 50
+LEAST_DAMPING = 1e-12
+"""Squared damping that keeps a rank-deficient task solvable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +91,6 @@ class ControllerSettings:
         return (float(LAWS.index(self.law)), *(float(value) for value in astuple(self)[1:]))
 
 
-def workspace() -> np.ndarray:
-    """A workspace (ROWS, 16) for the kernels; one per thread."""
-    return np.zeros((ROWS, 16))
-
-
 @kernel
 def _log_task(n, error, gain, work):
     """Task of the log law."""
@@ -97,21 +103,24 @@ def _log_task(n, error, gain, work):
 
 @kernel
 def _paper_task(n, error, gain, work):
-    """Task of the corrected paper law: under a body twist xi, vec(de/dt) = 1/2 vec(xi x_e), so A = -that."""
+    """Task of the corrected paper law, both sides times two so that M is near J_b for small errors.
+
+    Under a body twist xi, `vec(d(1 - x_e)/dt) = vec(xi x_e) / 2`, so the columns of -2 A are `vec(xi_k x_e)`.
+    """
     basis = work[BASIS : BASIS + 6]
     for k in range(6):
         v = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
         w = (1.0 if k == 3 else 0.0, 1.0 if k == 4 else 0.0, 1.0 if k == 5 else 0.0)
         column = screw.mul((0.0, w[0], w[1], w[2], 0.0, v[0], v[1], v[2]), error)
         for j in range(8):
-            basis[k, j] = -0.5 * column[j]
+            basis[k, j] = -column[j]
     gram(basis, 0, 8, work, GRAM)
     cholesky(work, GRAM, 0.0, work, FACTOR)
     for k in range(6):
         need = 0.0
         for j in range(8):
             need += basis[k, j] * ((1.0 if j == 0 else 0.0) - error[j])
-        work[NEED, k] = gain * need
+        work[NEED, k] = 2.0 * gain * need
         for j in range(n):
             s = 0.0
             for i in range(k, 6):
@@ -136,76 +145,96 @@ def _cap_twist(law, max_linear, max_angular, work):
 
 
 @kernel
-def _factor(row, n, work):
-    """Factor `M M^T` of the six rows from `row` on; bound of M's sixth singular value, 0 if there is none."""
-    gram(work, row, n, work, GRAM)
-    if not cholesky(work, GRAM, 0.0, work, FACTOR):
-        return 0.0
-    return smallest_singular_bound(work, FACTOR, work[SCRATCH])
-
-
-@kernel
-def _null_motion(n, limits, q, gain, work):
-    """Pull to the middle of the joint ranges, projected on the null space of J_b, whose factor is ready."""
-    z, b = work[NULL], work[SCRATCH]
-    for i in range(n):
-        span = limits[1, i] - limits[0, i]
-        z[i] = -gain * (q[i] - 0.5 * (limits[0, i] + limits[1, i])) / span**2 if span < 1e300 else 0.0
-    for _ in range(2):  # the second pass removes the rounding of the first
-        for k in range(6):
-            b[k] = 0.0
-            for j in range(n):
-                b[k] += work[JACOBIAN + k, j] * z[j]
-        forward_solve(work, FACTOR, b)
-        backward_solve(work, FACTOR, b)
-        for j in range(n):
-            for k in range(6):
-                z[j] -= work[JACOBIAN + k, j] * b[k]
-
-
-@kernel
-def _least_squares(n, threshold, largest, work, qdot):
-    """`M^T (M M^T + mu^2 I)^-1 b` for the task left in the workspace."""
-    sigma = _factor(TASK, n, work)
+def _factor_task(n, threshold, largest, work):
+    """Factor `M M^T + mu^2 I`; returns the bound of M's sixth singular value, 0 if M is rank-deficient."""
+    gram(work, TASK, n, work, GRAM)
+    sigma = 0.0
+    if cholesky(work, GRAM, 0.0, work, FACTOR):
+        sigma = smallest_singular_bound(work, FACTOR, work[SCRATCH])
     if sigma < threshold:
         ratio = sigma / threshold
-        cholesky(work, GRAM, (1.0 - ratio * ratio) * largest * largest + 1e-12, work, FACTOR)
-    b = work[SOLUTION]
+        cholesky(work, GRAM, (1.0 - ratio * ratio) * largest * largest + LEAST_DAMPING, work, FACTOR)
+    return sigma
+
+
+@kernel
+def _middle_pull(n, q, gain, work):
+    """Pull of every joint to the middle of its range, none for a continuous joint."""
+    for i in range(n):
+        low, high = work[LIMITS, i], work[LIMITS + 1, i]
+        span = high - low
+        work[NULL, i] = -gain * (q[i] - 0.5 * (low + high)) / span**2 if span < 1e300 else 0.0
+
+
+@kernel
+def _least_squares(n, work, qdot):
+    """`z + M^T (M M^T + mu^2 I)^-1 (b - M z)` with what is ready in the workspace."""
+    b, z = work[SOLUTION], work[NULL]
     for k in range(6):
-        b[k] = work[NEED, k]
+        s = work[NEED, k]
+        for j in range(n):
+            s -= work[TASK + k, j] * z[j]
+        b[k] = s
     forward_solve(work, FACTOR, b)
     backward_solve(work, FACTOR, b)
     for j in range(n):
-        qdot[j] = 0.0
+        s = z[j]
         for k in range(6):
-            qdot[j] += work[TASK + k, j] * b[k]
+            s += work[TASK + k, j] * b[k]
+        qdot[j] = s
 
 
 @kernel
-def _worst_joint(n, limits, q, gain, qdot):
+def _allowed(q, i, gain, work):
+    """Lowest and highest speed that joint i may have for the sake of its position limits."""
+    return -gain * (q[i] - work[LIMITS, i]), gain * (work[LIMITS + 1, i] - q[i])
+
+
+@kernel
+def _worst_joint(n, q, gain, work, qdot):
     """The joint that exceeds its position bound most, and the speed it is allowed; -1 if there is none."""
-    worst, excess, allowed = -1, 1e-12, 0.0
+    worst, excess, speed = -1, 1e-12, 0.0
     for i in range(n):
-        low, high = -gain * (q[i] - limits[0, i]), gain * (limits[1, i] - q[i])
+        low, high = _allowed(q, i, gain, work)
         if qdot[i] - high > excess:
-            worst, excess, allowed = i, qdot[i] - high, high
+            worst, excess, speed = i, qdot[i] - high, high
         if low - qdot[i] > excess:
-            worst, excess, allowed = i, low - qdot[i], low
-    return worst, allowed
+            worst, excess, speed = i, low - qdot[i], low
+    return worst, speed
 
 
 @kernel
-def _scale_to_limits(n, limits, q, gain, qdot):
+def _hold_joints(n, q, threshold, largest, gain, work, qdot):
+    """Hold joints at their bounds, at most dof - 6 of them, and let the others do the whole task."""
+    held = work[NULL]
+    for i in range(n):
+        held[i] = 0.0
+    for _ in range(n - 6):
+        joint, speed = _worst_joint(n, q, gain, work, qdot)
+        if joint < 0:
+            return
+        for k in range(6):
+            work[NEED, k] -= work[TASK + k, joint] * speed
+            work[TASK + k, joint] = 0.0
+        # a joint without a column keeps its z
+        held[joint] = speed
+        _factor_task(n, threshold, largest, work)
+        _least_squares(n, work, qdot)
+
+
+@kernel
+def _scale_to_limits(n, q, gain, work, qdot):
     """Scale all speeds together so that no joint exceeds its speed or its approach to a position limit."""
     scale = 1.0
     for i in range(n):
-        low, high = -gain * (q[i] - limits[0, i]), gain * (limits[1, i] - q[i])
-        if abs(qdot[i]) > limits[2, i]:
-            scale = min(scale, limits[2, i] / abs(qdot[i]))
-        if qdot[i] > 0.0 and qdot[i] > high:
-            scale = min(scale, max(high, 0.0) / qdot[i])
-        if qdot[i] < 0.0 and qdot[i] < low:
-            scale = min(scale, min(low, 0.0) / qdot[i])
+        low, high = _allowed(q, i, gain, work)
+        speed = qdot[i]
+        if abs(speed) > work[LIMITS + 2, i]:
+            scale = min(scale, work[LIMITS + 2, i] / abs(speed))
+        if speed > 0.0 and speed > high:
+            scale = min(scale, max(high, 0.0) / speed)
+        if speed < 0.0 and speed < low:
+            scale = min(scale, min(low, 0.0) / speed)
     for i in range(n):
         qdot[i] *= scale
 
@@ -213,67 +242,45 @@ def _scale_to_limits(n, limits, q, gain, qdot):
 @kernel
 def choose_sign(error, sign):
     """The way round: the shorter one at first (sign 0), then kept until it is clearly the longer one."""
-    c = error[0] * (sign if sign != 0.0 else 1.0)
     if sign == 0.0:
-        return 1.0 if c >= 0.0 else -1.0
-    return -sign if c < -SIGN_HYSTERESIS else sign
+        return 1.0 if error[0] >= 0.0 else -1.0
+    return -sign if error[0] * sign < -SIGN_HYSTERESIS else sign
 
 
 @kernel
-def joint_velocity(limits, q, error, settings, work, qdot):
+def joint_velocity(work, q, error, qdot):
     """Joint speeds towards the target; the body Jacobian at q is ready in the workspace.
 
     Args:
-        limits: (3, dof), see `Arm.limits`.
+        work: see `workspace.bound`.
         q: (dof,) joints that the error belongs to.
         error: x_m* x_d as a tuple, its sign chosen.
-        settings: `ControllerSettings.packed()`.
-        work: see `workspace`.
         qdot: (dof,) result.
     """
-    law, gain, max_linear, max_angular, threshold, largest, null_gain, limit_gain = settings
+    law, gain, threshold, largest = work[CONTROL, 0], work[CONTROL, 1], work[CONTROL, 4], work[CONTROL, 5]
+    null_gain, limit_gain = work[CONTROL, 6], work[CONTROL, 7]
     n = len(q)
-    rested = True
-    if n > 6 and null_gain > 0.0 and _factor(JACOBIAN, n, work) > NULL_CUT_OFF:
-        _null_motion(n, limits, q, null_gain, work)
-        rested = False
     if law == 0.0:
         _log_task(n, error, gain, work)
     else:
         _paper_task(n, error, gain, work)
-    _cap_twist(law, max_linear, max_angular, work)
-    _least_squares(n, threshold, largest, work, qdot)
-    if not rested:
-        for i in range(n):
-            qdot[i] += work[NULL, i]
-    # at most dof - 6 joints can be held with the task kept
-    held = work[NULL]
-    for i in range(n):
-        held[i] = np.inf
-    for _ in range(n - 6):
-        joint, speed = _worst_joint(n, limits, q, limit_gain, qdot)
-        if joint < 0:
-            break
-        held[joint] = speed
-        for k in range(6):
-            work[NEED, k] -= work[TASK + k, joint] * speed
-            work[TASK + k, joint] = 0.0
-        _least_squares(n, threshold, largest, work, qdot)
-        for i in range(n):
-            if held[i] < np.inf:
-                qdot[i] = held[i]
-    _scale_to_limits(n, limits, q, limit_gain, qdot)
+    _cap_twist(law, work[CONTROL, 2], work[CONTROL, 3], work)
+    sigma = _factor_task(n, threshold, largest, work)
+    fade = min(1.0, max(0.0, sigma - threshold) / max(threshold, 1e-9))
+    _middle_pull(n, q, null_gain * fade if n > 6 else 0.0, work)
+    _least_squares(n, work, qdot)
+    _hold_joints(n, q, threshold, largest, limit_gain, work, qdot)
+    _scale_to_limits(n, q, limit_gain, work, qdot)
 
 
 @kernel
-def tick(chain, limits, q, target, sign, settings, work, qdot):
+def tick(work, q, target, sign, qdot):
     """One control step: joint speeds from q towards the target (8,); returns the way round taken."""
-    x = forward(chain, q, work[FRAMES : FRAMES + 16])
-    body_jacobian(chain, x, work[FRAMES : FRAMES + 16], work)
+    x = pose_and_jacobian(work, q)
     goal = (target[0], target[1], target[2], target[3], target[4], target[5], target[6], target[7])
     error = screw.mul(screw.conj(x), goal)
     sign = choose_sign(error, sign)
-    joint_velocity(limits, q, screw.neg(error) if sign < 0.0 else error, settings, work, qdot)
+    joint_velocity(work, q, screw.neg(error) if sign < 0.0 else error, qdot)
     return sign
 
 
@@ -286,9 +293,7 @@ class Controller:
     def __init__(self, arm: Arm, settings: ControllerSettings | None = None):
         self.arm = arm
         self.settings = settings or ControllerSettings()
-        self._packed = self.settings.packed()
-        self._limits = arm.limits
-        self._work = workspace()
+        self._work = bound(arm, self.settings.packed())
         self._sign = 0.0
 
     def reset(self) -> None:
@@ -298,7 +303,5 @@ class Controller:
     def __call__(self, q: ArrayLike, target: Pose) -> np.ndarray:
         """Joint speeds (dof,) [rad/s] at joints q (dof,) towards the target pose of the tcp."""
         qdot = np.empty(self.arm.dof)
-        q = np.asarray(q, dtype=np.float64)
-        args = (self.arm.chain, self._limits, q, target.dq, self._sign, self._packed, self._work, qdot)
-        self._sign = tick(*args)
+        self._sign = tick(self._work, np.asarray(q, dtype=np.float64), target.dq, self._sign, qdot)
         return qdot

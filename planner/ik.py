@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike
 
 from . import screw
 from .arm import Arm
-from .chain import body_jacobian, forward
-from .controller import FRAMES, ControllerSettings, joint_velocity, workspace
+from .controller import ControllerSettings, joint_velocity
 from .jit import kernel
 from .pose import Pose, PosePath
+from .workspace import LIMITS, bound, pose_and_jacobian
 
 POSITION_TOLERANCE, ANGLE_TOLERANCE = 1e-4, 1e-3
 _STEP = ControllerSettings(
@@ -20,32 +20,29 @@ _STEP = ControllerSettings(
 
 
 @kernel
-def _solve(chain, limits, target, q, iterations, settings, work, qdot):
+def _solve(work, target, q, iterations, qdot):
     """Move q to a solution; False where it is not reached."""
-    frames = work[FRAMES : FRAMES + 16]
     for _ in range(iterations):
-        x = forward(chain, q, frames)
+        x = pose_and_jacobian(work, q)
         distance, angle = screw.gap(x, target)
         if distance < POSITION_TOLERANCE and angle < ANGLE_TOLERANCE:
             return True
-        body_jacobian(chain, x, frames, work)
-        error = screw.shorter(screw.mul(screw.conj(x), target))
-        joint_velocity(limits, q, error, settings, work, qdot)
+        joint_velocity(work, q, screw.shorter(screw.mul(screw.conj(x), target)), qdot)
         for i in range(len(q)):
             q[i] += qdot[i]
     return False
 
 
 @kernel
-def _margins(chain, limits, path, q, settings, work, qdot, margins):
+def _margins(work, path, q, qdot, margins):
     """Joint margin at each pose, walking backwards from a solution q of the last one."""
     margins[:] = -np.inf
     for k in range(len(path) - 1, -1, -1):
-        if not _solve(chain, limits, screw.load8(path, k), q, 60, settings, work, qdot):
+        if not _solve(work, screw.load8(path, k), q, 60, qdot):
             return
         margins[k] = np.inf
         for i in range(len(q)):
-            margins[k] = min(margins[k], q[i] - limits[0, i], limits[1, i] - q[i])
+            margins[k] = min(margins[k], q[i] - work[LIMITS, i], work[LIMITS + 1, i] - q[i])
 
 
 def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: int = 300) -> np.ndarray | None:
@@ -54,10 +51,8 @@ def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: i
     Local: another seed may lead to another posture, or succeed where this one fails.
     """
     q = np.array(seed, dtype=np.float64)
-    limits = _unhurried(arm)
     goal = tuple(float(value) for value in target.dq)
-    found = _solve(arm.chain, limits, goal, q, iterations, _STEP, workspace(), np.empty(arm.dof))
-    return q if found else None
+    return q if _solve(_unhurried(arm), goal, q, iterations, np.empty(arm.dof)) else None
 
 
 def path_margins(arm: Arm, path: PosePath, goal_joints: ArrayLike) -> np.ndarray:
@@ -66,13 +61,12 @@ def path_margins(arm: Arm, path: PosePath, goal_joints: ArrayLike) -> np.ndarray
     -inf from the first pose on, seen from the end, that has no solution near the one before.
     """
     margins = np.empty(len(path))
-    q = np.array(goal_joints, dtype=np.float64)
-    _margins(arm.chain, _unhurried(arm), path.dqs, q, _STEP, workspace(), np.empty(arm.dof), margins)
+    _margins(_unhurried(arm), path.dqs, np.array(goal_joints, dtype=np.float64), np.empty(arm.dof), margins)
     return margins
 
 
 def _unhurried(arm: Arm) -> np.ndarray:
-    """Limits with a joint step of at most 0.5 rad per iteration."""
-    limits = arm.limits
-    limits[2] = 0.5
-    return limits
+    """A workspace in which an iteration moves no joint by more than half a radian."""
+    work = bound(arm, _STEP)
+    work[LIMITS + 2] = 0.5
+    return work

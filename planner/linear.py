@@ -68,9 +68,13 @@ def smallest_singular_bound(low, row, b):
     """
     total = 0.0
     for j in range(6):
-        for k in range(6):
-            b[k] = 1.0 if k == j else 0.0
-        forward_solve(low, row, b)
-        for k in range(j, 6):
-            total += b[k] * b[k]
+        # column j of the inverse factor, which is zero above its diagonal
+        b[j] = 1.0 / low[row + j, j]
+        total += b[j] * b[j]
+        for i in range(j + 1, 6):
+            s = 0.0
+            for k in range(j, i):
+                s -= low[row + i, k] * b[k]
+            b[i] = s / low[row + i, i]
+            total += b[i] * b[i]
     return 1.0 / math.sqrt(total)

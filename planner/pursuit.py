@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike
 
 from . import screw
 from .arm import Arm
-from .chain import body_jacobian, forward
-from .controller import FRAMES, ControllerSettings, choose_sign, joint_velocity, workspace
+from .controller import ControllerSettings, choose_sign, joint_velocity
 from .errors import BadOption
 from .jit import kernel
 from .pose import PosePath
+from .workspace import LIMITS, PURSUIT, bound, pose_and_jacobian
 
 METERS_PER_RADIAN = 0.2
 PROGRESS = 1e-4
@@ -87,15 +87,12 @@ class RollOut(NamedTuple):
 
 
 @kernel
-def pursue(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot):
+def pursue(work, path, q, dt, memory, qdot):
     """One tick along the path (n, 8): joint speeds into `qdot`, the state of the pursuit in `memory` (4,)."""
-    tau, radius, position_tolerance, angle_tolerance, patience, every_tick = pursuit
-    frames = work[FRAMES : FRAMES + 16]
-    x = forward(chain, q, frames)
-    body_jacobian(chain, x, frames, work)
+    tau, radius, every_tick = work[PURSUIT, 0], work[PURSUIT, 1], work[PURSUIT, 5]
+    x = pose_and_jacobian(work, q)
     before = int(memory[INDEX])
     index, last = before, len(path) - 1
-    left = 0.0
     while True:
         distance, angle = screw.gap(x, screw.load8(path, index))
         left = math.hypot(distance, METERS_PER_RADIAN * angle)
@@ -107,13 +104,13 @@ def pursue(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot):
     memory[INDEX] = index
     for i in range(len(q)):
         qdot[i] = 0.0
-    if index == last and distance <= position_tolerance and angle <= angle_tolerance:
+    if index == last and distance <= work[PURSUIT, 2] and angle <= work[PURSUIT, 3]:
         return ARRIVED
     if index > before or left < memory[BEST] - PROGRESS:
         memory[BEST], memory[WAITED] = left, 0.0
     else:
         memory[WAITED] += dt
-        if memory[WAITED] > patience:
+        if memory[WAITED] > work[PURSUIT, 4]:
             return STALLED
     error = screw.mul(screw.conj(x), screw.load8(path, index))
     memory[SIGN] = choose_sign(error, memory[SIGN])
@@ -121,19 +118,19 @@ def pursue(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot):
         error = screw.neg(error)
     if tau < 1.0:
         error = screw.from_twist(screw.scaled(screw.twist_along(error), tau))
-    joint_velocity(limits, q, error, controller, work, qdot)
+    joint_velocity(work, q, error, qdot)
     return FOLLOWING
 
 
 @kernel
-def _roll_out(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot, trace):
+def _roll_out(work, path, q, dt, memory, qdot, trace):
     """Follow the whole path from q, which is moved along; status, ticks, smallest joint margin."""
     margin = np.inf
     for count in range(len(trace)):
         for i in range(len(q)):
             trace[count, i] = q[i]
-            margin = min(margin, q[i] - limits[0, i], limits[1, i] - q[i])
-        status = pursue(chain, limits, path, q, dt, controller, pursuit, memory, work, qdot)
+            margin = min(margin, q[i] - work[LIMITS, i], work[LIMITS + 1, i] - q[i])
+        status = pursue(work, path, q, dt, memory, qdot)
         if status != FOLLOWING:
             return status, count, margin
         for i in range(len(q)):
@@ -157,10 +154,8 @@ class Pursuit:
         controller = controller or ControllerSettings()
         if not 0 < controller.gain * dt <= 1:
             raise BadOption("gain", f"gain * dt = {controller.gain * dt:g} is not in (0, 1]")
-        self._settings = controller.packed(), (settings or PursuitSettings()).packed()
-        self._limits = arm.limits
+        self._work = bound(arm, controller.packed(), (settings or PursuitSettings()).packed())
         self._memory = np.array([0.0, 0.0, np.inf, 0.0])
-        self._work = workspace()
 
     @property
     def index(self) -> int:
@@ -171,16 +166,13 @@ class Pursuit:
         """Status (FOLLOWING, ARRIVED or STALLED) and joint speeds (dof,) at joints q (dof,)."""
         qdot = np.empty(self.arm.dof)
         q = np.ascontiguousarray(q, dtype=np.float64)
-        path = self.path.dqs
-        shared = (*self._settings, self._memory, self._work, qdot)
-        return pursue(self.arm.chain, self._limits, path, q, self.dt, *shared), qdot
+        return pursue(self._work, self.path.dqs, q, self.dt, self._memory, qdot), qdot
 
     def roll_out(self, q: ArrayLike, max_seconds: float = 60.0) -> RollOut:
         """Follow the whole path with ideal tracking; the pursuit itself is unchanged."""
         q = np.array(q, dtype=np.float64)
         trace = np.empty((round(max_seconds / self.dt) + 1, self.arm.dof))
-        memory = np.array([0.0, 0.0, np.inf, 0.0])
-        shared = (*self._settings, memory, self._work, np.empty(self.arm.dof), trace)
-        status, ticks, margin = _roll_out(self.arm.chain, self._limits, self.path.dqs, q, self.dt, *shared)
+        memory, qdot = np.array([0.0, 0.0, np.inf, 0.0]), np.empty(self.arm.dof)
+        status, ticks, margin = _roll_out(self._work, self.path.dqs, q, self.dt, memory, qdot, trace)
         reason = {ARRIVED: "", STALLED: "ik_or_limit", FOLLOWING: "timeout"}[status]
         return RollOut(status == ARRIVED, reason, q, ticks * self.dt, margin, trace[: ticks + 1])
