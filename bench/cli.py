@@ -15,7 +15,7 @@ USAGE_ERROR = 2
 app = typer.Typer(
     help="One demonstration in, a robot policy out, and a benchmark that proves it.\n\nStart with: onedemo run stack",
     no_args_is_help=True,
-    rich_markup_mode="rich",
+    rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     add_completion=False,
 )
@@ -25,11 +25,9 @@ app.add_typer(demo_commands.app, name="demo")
 @app.command()
 def run(
     config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped config, like stack.")],
-    overrides: Annotated[
-        list[str] | None, typer.Argument(metavar="[KEY=VALUE]...", help="Changes to the config.")
-    ] = None,
+    overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Where run folders are made.")] = Path("runs"),
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the run folder, and errors.")] = False,
 ) -> None:
     """Run episodes of a config and write a report, a figure and a video.
 
@@ -40,9 +38,9 @@ def run(
     standard output is the run folder.
 
     Examples:
-    onedemo run stack
+    - onedemo run stack
 
-    onedemo run configs/bench/stack.yaml episodes=50 level=L2 seed=1000
+    - onedemo run configs/bench/stack.yaml episodes=50 level=L2 seed=1000
     """
     from .run import run_config
 

@@ -10,9 +10,7 @@ import typer
 from .console import console
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from ..planner.demo import Demonstration
+    from ..planner.demo import Demonstration, Segment
 
 app = typer.Typer(
     help="Look at a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="rich"
@@ -43,7 +41,10 @@ def check(
     out.print(f"  joints    {'recorded' if demo.joint_positions is not None else 'not recorded'}")
     out.print(f"  licence   {demo.licence}")
     if demo.segments:
-        out.print(_segment_table(demo))
+        out.print("segments, each with the screw from its first to its last pose in the world:")
+    for segment in demo.segments:
+        what, screw = _segment_lines(demo, segment)
+        out.print(f"  [bold]{segment.name}[/bold]", f"    {what}", f"    {screw}", sep="\n", soft_wrap=True)
     warnings = warnings_of(demo)
     for warning in warnings:
         out.print(f"[yellow]warning[/yellow]  {warning}")
@@ -78,7 +79,7 @@ def import_(
 
     title = name or output.stem
     if raw.suffix == ".npz":
-        from ..envs.sim import robot_arm
+        from ..envs.scene import robot_arm
 
         demo = stack_from_teleoperation(raw, robot_arm(robot), name=title, licence=licence)
     else:
@@ -105,29 +106,24 @@ def demonstration_path(name: str) -> Path:
     return path if looks_like_a_file else shipped_demonstration(name)
 
 
-def _segment_table(demo: Demonstration) -> Table:
+def _segment_lines(demo: Demonstration, segment: Segment) -> tuple[str, str]:
+    """What a segment does, and the screw from its first to its last pose."""
     import numpy as np
-    from rich.table import Table
 
     from ..planner.dualquat import screw_parameters
 
-    table = Table(title="segments; screw = the motion from first to last pose, in the world", title_justify="left")
-    for title in ("name", "samples", "relative to", "holds", "then", "screw axis", "angle", "along it", "pitch"):
-        table.add_column(title, justify="left" if title in ("name", "relative to", "holds", "then") else "right")
-    for segment in demo.segments:
-        first, last = demo.path[segment.start], demo.path[segment.stop]
-        screw = screw_parameters((last @ first.inverse()).dq)
-        axis = " ".join(f"{value:+.2f}" for value in screw.axis)
-        pitch = f"{screw.pitch:+.3f} m/rad" if np.isfinite(screw.pitch) else "pure slide"
-        table.add_row(
-            segment.name,
-            f"{segment.start}-{segment.stop}",
-            segment.reference or "world",
-            segment.held or "-",
-            segment.gripper,
-            axis,
-            f"{np.degrees(screw.angle):.1f} deg",
-            f"{screw.travel:+.3f} m",
-            pitch,
+    first, last = demo.path[segment.start], demo.path[segment.stop]
+    screw = screw_parameters((last @ first.inverse()).dq)
+    x, y, z = screw.axis
+    axis = f"({x:+.2f} {y:+.2f} {z:+.2f})"
+    carries = f"carries {segment.held}, " if segment.held else ""
+    then = {"close": ", then the gripper closes", "open": ", then the gripper opens"}.get(segment.gripper, "")
+    what = (
+        f"samples {segment.start} to {segment.stop}, {carries}ends relative to {segment.reference or 'the world'}{then}"
+    )
+    if np.isfinite(screw.pitch):
+        return what, (
+            f"screw: {np.degrees(screw.angle):.1f} deg about {axis}, {screw.travel:+.3f} m along it, "
+            f"pitch {screw.pitch:+.3f} m/rad"
         )
-    return table
+    return what, f"screw: {screw.travel:.3f} m along {axis}, no turn"

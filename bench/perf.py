@@ -10,7 +10,9 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -95,20 +97,19 @@ def _controller_rows() -> Iterator[Row]:
 def _peer_tick_row(ours: Callable[[], object], q: np.ndarray, target: np.ndarray) -> Iterator[Row]:
     name, goal = "controller tick from Python / DQ_Robotics", 1 / 12
     try:
-        import dqrobotics as peer
-        from dqrobotics.robots import FrankaEmikaPandaRobot
-        from dqrobotics.utils.DQ_LinearAlgebra import pinv
+        peer = import_module("dqrobotics")
+        robots, algebra = import_module("dqrobotics.robots"), import_module("dqrobotics.utils.DQ_LinearAlgebra")
     except ImportError:
         yield Row(name, None, "ratio", goal, None, "needs: pip install 'onedemo[peers]'")
         return
-    robot = FrankaEmikaPandaRobot.kinematics()
+    robot = robots.FrankaEmikaPandaRobot.kinematics()
     goal_pose, one, c8, pull = peer.DQ(target), peer.DQ([1.0]), peer.C8(), -0.1 * q
 
     def theirs() -> np.ndarray:
         """The same law with the peer's own algebra, pseudo-inverse and null-space projection included."""
         error = (one - peer.conj(robot.fkm(q)) * goal_pose).vec8()
         n = peer.haminus8(goal_pose) @ c8 @ robot.pose_jacobian(q)
-        inverse = pinv(n)
+        inverse = algebra.pinv(n)
         return inverse @ (15.0 * error) + pull - inverse @ (n @ pull)
 
     mine, peers = seconds_per_call(ours, theirs)
@@ -130,9 +131,9 @@ def _step_rows() -> Iterator[Row]:
     import gymnasium as gym
     import mujoco
 
-    import onedemo.envs  # noqa: F401  (registers the ids)
+    from .. import envs  # noqa: F401  (registers the ids)
 
-    env = gym.make("onedemo/Stack-v0").unwrapped
+    env: Any = gym.make("onedemo/Stack-v0").unwrapped
     env.reset(seed=0)
     model, data = env.sim.model, env.sim.data
     action, substeps = np.zeros(env.action_space.shape), env.substeps
@@ -144,7 +145,8 @@ def _step_rows() -> Iterator[Row]:
     (reset,) = seconds_per_call(lambda: env.reset())
     yield row("Stack soft reset", reset * 1e3, "ms", 3.0)
 
-    two, peer = gym.make("onedemo/Stack-v0", n_blocks=2).unwrapped, _robosuite_stack()
+    two: Any = gym.make("onedemo/Stack-v0", n_blocks=2).unwrapped
+    peer = _robosuite_stack()
     two.reset(seed=0)
     peer.reset()
     idle = np.zeros(peer.action_dim)
@@ -154,7 +156,7 @@ def _step_rows() -> Iterator[Row]:
     yield row("Stack step / robosuite's own step", ours / theirs, "ratio", 1 / 8, note)
 
 
-def _robosuite_stack():
+def _robosuite_stack() -> Any:
     import robosuite
 
     return robosuite.make(
@@ -234,20 +236,17 @@ def write_json(rows: list[Row], path: Path) -> None:
 
 def run_perf(pattern: str, json_file: Path | None) -> int:
     """Measure and print a table; exit code 1 if a bar is missed."""
-    from rich.table import Table
-
-    table = Table(title="speeds; a line is well when its value is at most its goal", title_justify="left")
-    for title, justify in (("line", "left"), ("value", "right"), ("goal", "right"), ("", "left"), ("note", "left")):
-        table.add_column(title, justify=justify)
-    rows = []
+    out, rows = console(), []
+    out.print("a line is well when its value is at most its goal")
     with console(stderr=True).status("measuring"):
         for line in measure(pattern):
             rows.append(line)
             value = "-" if line.value is None else f"{line.value:.3g} {line.unit}"
-            goal = "-" if line.goal is None else f"{line.goal:.3g}"
-            verdict = {True: "[green]ok[/green]", False: "[red]missed[/red]", None: "-"}[line.ok]
-            table.add_row(line.name, value, goal, verdict, line.note)
-    console().print(table)
+            goal = "" if line.goal is None else f"(goal {line.goal:.3g})"
+            verdict = {True: "[green]ok[/green]    ", False: "[red]missed[/red]", None: "-     "}[line.ok]
+            out.print(f"{verdict}  {line.name}: [bold]{value}[/bold] {goal}", soft_wrap=True)
+            if line.note:
+                out.print(f"        [dim]{line.note}[/dim]", soft_wrap=True)
     if json_file is not None:
         write_json(rows, json_file)
     return 1 if any(line.ok is False for line in rows) else 0

@@ -91,7 +91,7 @@ def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
     _check_names(config, source)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        env = gym.make(
+        env: Any = gym.make(
             IDS[config.task],
             robot=config.robot,
             level=config.level,
@@ -108,7 +108,7 @@ def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
 def _check_names(config: RunConfig, source: Path) -> None:
     from ..baselines.factory import POLICIES
     from ..envs.layouts import LEVELS
-    from ..envs.sim import ROBOTS
+    from ..envs.scene import ROBOTS
 
     for key, known in (("level", LEVELS), ("robot", ROBOTS), ("method", POLICIES)):
         value = getattr(config, key)

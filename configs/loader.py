@@ -83,8 +83,9 @@ def _refuse_indirection(event: Any, source: str | Path) -> None:
     where = f"line {event.start_mark.line + 1}"
     if isinstance(event, AliasEvent) or event.anchor is not None:
         raise BadConfig(source, where, "anchors and aliases are not allowed: write the value out")
-    if getattr(event, "tag", None) is not None:
-        raise BadConfig(source, where, f"tags are not allowed: {event.tag}")
+    tag = getattr(event, "tag", None)
+    if tag is not None:
+        raise BadConfig(source, where, f"tags are not allowed: {tag}")
 
 
 def _copied(value: Any) -> Any:

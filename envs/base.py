@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +13,8 @@ from ..planner.errors import BadAction, BadOption, UnknownName
 from ..planner.pose import Pose
 from . import spaces as space
 from .render import Ghost, Renderer
-from .sim import PHYSICS_DT, Box, Simulation
+from .scene import Box
+from .sim import PHYSICS_DT, Simulation
 from .state import State
 from .task import TaskDescription
 
@@ -22,6 +23,7 @@ REWARDS = ("sparse", "dense")
 MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
 """Tcp speeds [m/s, rad/s] of a full `ee_twist` action."""
 TWIST_DAMPING = 0.05
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
 Observation = dict[str, np.ndarray]
 
 
@@ -39,7 +41,7 @@ def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
 class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
     """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
+    metadata = METADATA
 
     def __init__(
         self,
@@ -59,7 +61,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         self.substeps = _substeps(control_frequency)
         self.sim = Simulation(robot, boxes)
         self.arms = tuple(index.arm for index in self.sim.scene.arms)
-        self.metadata = {**self.metadata, "render_fps": control_frequency}
+        self.metadata = {**METADATA, "render_fps": control_frequency}
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
         self.action_space = space.action_space(entries, len(self.arms))
         self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
@@ -106,10 +108,8 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             BadAction: wrong shape, or not finite.
         """
         rows = self._checked(action).reshape(len(self.arms), -1)
-        if self.control_mode == "joint_velocity":
-            speeds = rows[:, :-1] * self._speed_limits
-        else:
-            speeds = self._resolved(rows)
+        in_joints = self.control_mode == "joint_velocity"
+        speeds = rows[:, :-1] * self._speed_limits if in_joints else self._resolved(rows)
         self.sim.step(speeds, rows[:, -1], self.substeps)
         state = self.sim.read()
         reward, terminated, info = self._judge(state)

@@ -78,7 +78,7 @@ def nominal_blocks(count: int) -> np.ndarray:
 
 
 def stack_layout(
-    rng: np.random.Generator, level: Level, count: int, arm_axis: np.ndarray, joints: tuple[int, int]
+    rng: np.random.Generator, level: Level, count: int, arm_axis: np.ndarray, joints: tuple[int, ...]
 ) -> Layout:
     """A layout of blocks and base place by rejection: independent of any method.
 

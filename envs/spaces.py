@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from gymnasium import spaces
 
@@ -32,7 +34,7 @@ def pose_box(count: int) -> spaces.Box:
 
 def observation_space(
     arms: tuple[Arm, ...], gripper_width: tuple[float, ...], objects: int, motions: int
-) -> spaces.Dict:
+) -> spaces.Space[Any]:
     """The observation of a task; its entries are described in the environment's docstring."""
     shape = (len(arms), arms[0].dof)
     lower = np.stack([arm.lower for arm in arms]) - JOINT_SLACK

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .sim import ARM, FINGERS, FIRST_OBJECT, WORLD
+from .scene import ARM, FINGERS, FIRST_OBJECT, WORLD
 
 BLOCK_SIZE = (0.06, 0.04, 0.05)
 BLOCK = 0.04

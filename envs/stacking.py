@@ -10,7 +10,7 @@ from ..planner.errors import BadOption, UnknownName
 from .base import OneDemoEnv
 from .layouts import TABLE_EDGE, Layout, level_named, stack_layout
 from .options import checked_joints, checked_poses
-from .sim import TABLE_HEIGHT, Box
+from .scene import TABLE_HEIGHT, Box
 from .spaces import observation_space
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress, allowed_contact, shaped
 from .state import State
@@ -30,12 +30,14 @@ class StackEnv(OneDemoEnv):
     of its place, touched by no finger, standing still, the hand withdrawn by 5 cm, for half a second.
 
     ## Action Space
-    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz.
+    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
 
-    | index | `control_mode="joint_velocity"` | `control_mode="ee_twist"` |
+    | control mode | entry | meaning |
     |---|---|---|
-    | 0 to 6 (0 to 5) | joint speed as a fraction of the joint's limit | tcp velocity, then angular velocity, in world axes, as fractions of 0.25 m/s and 1.2 rad/s |
-    | last | gripper: above 0 closes, below 0 opens, 0 leaves it | the same |
+    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
+    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
+    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
+    | both | last | gripper: above 0 closes, below 0 opens, 0 leaves it |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or blocks. Poses are `x y z [m]`, then quaternion wxyz.

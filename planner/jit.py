@@ -12,11 +12,13 @@ import os
 import tempfile
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import config
+
+config: Any = import_module("numba.core.config")
 
 
 @cache

@@ -1,0 +1,251 @@
+"""Scenes as compiled models: robosuite builds them, and this is the only file that touches it.
+
+robosuite's own controllers cost six times the physics and track a path badly; here every arm joint is MuJoCo's
+integrated-velocity servo: the control is a joint speed, its integral is held by a stiff position servo against
+gravity-free links.
+"""
+
+from __future__ import annotations
+
+import copy
+import logging
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..planner.arm import Arm
+from ..planner.errors import UnknownName
+from .servos import leave_out_unused, use_velocity_servos
+
+TABLE_HEIGHT = 0.8
+TABLE_HALF_SIZE = 0.4
+TABLE_COLOR = "0.78 0.74 0.68 1"
+ROBOTS = {
+    "Panda": (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
+}
+"""The robots that are supported, with their joint speed limits [rad/s] (the maker's data sheet)."""
+WORLD, ARM, FINGERS, FIRST_OBJECT = 0, 1, 2, 3
+"""Who a geom belongs to: the table and the floor, an arm, its fingers, or object k as FIRST_OBJECT + k."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A free wooden box: name, full extents (3,) [m] and a robosuite texture name."""
+
+    name: str
+    size: tuple[float, float, float]
+    texture: str
+    density: float = 600.0
+
+
+@dataclass(frozen=True)
+class ArmIndex:
+    """Where one arm and its gripper are in MuJoCo's arrays.
+
+    Attributes:
+        arm: its kinematics.
+        qpos: (dof,) addresses of the joint positions.
+        qvel: (dof,) addresses of the joint speeds.
+        ctrl: (dof,) its actuators.
+        act: (dof,) their integrator states.
+        site: the tcp.
+        pads: geoms of the left and right finger pad.
+        finger_qpos: addresses of the finger joints.
+        grip: actuators of the fingers.
+        opened: their controls when open.
+        closed: their controls when closed.
+    """
+
+    arm: Arm
+    qpos: np.ndarray
+    qvel: np.ndarray
+    ctrl: np.ndarray
+    act: np.ndarray
+    site: int
+    pads: tuple[int, int]
+    finger_qpos: np.ndarray
+    grip: np.ndarray
+    opened: np.ndarray
+    closed: np.ndarray
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A compiled scene; `model` is shared: copy it before changing it.
+
+    Attributes:
+        model: MuJoCo's model.
+        arms: the arms.
+        home: (n_arms, dof) the robot's usual joints.
+        objects: body ids of the boxes.
+        owner: (ngeom,) whose geom it is, see WORLD.
+        labels: (ngeom,) names for messages.
+    """
+
+    model: mujoco.MjModel
+    arms: tuple[ArmIndex, ...]
+    home: np.ndarray
+    objects: np.ndarray
+    owner: np.ndarray
+    labels: tuple[str, ...]
+
+
+@lru_cache(maxsize=8)
+def compiled_scene(robot: str, boxes: tuple[Box, ...]) -> Scene:
+    """The scene of a robot at a table with boxes; compiled once per process.
+
+    Raises:
+        UnknownName: no such robot.
+    """
+    if robot not in ROBOTS:
+        raise UnknownName("robot", robot, ROBOTS)
+    env = _table_env(robot, boxes)
+    model = copy.copy(env.sim.model._model)
+    rob = env.robots[0]
+    arms = tuple(_arm_index(model, env, robot, side) for side in rob.arms)
+    home = np.array(rob.init_qpos, dtype=np.float64).reshape(len(arms), -1)
+    bodies = [_id(model, mujoco.mjtObj.mjOBJ_BODY, box.root_body) for box in env.boxes]
+    owner, labels = _owners(model, env, boxes, bodies)
+    return Scene(model, arms, home, np.array(bodies), owner, labels)
+
+
+def robot_arm(robot: str, index: int = 0) -> Arm:
+    """The kinematics of a robot's arm as it stands at the table, tcp between the finger pads."""
+    return compiled_scene(robot, ()).arms[index].arm
+
+
+def _table_env(robot: str, boxes: tuple[Box, ...]) -> Any:
+    """A robosuite environment that is used for its model only."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)  # its import warns of optional things that are not used here
+    try:
+        import robosuite
+    finally:
+        logging.disable(before)
+    from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
+    from robosuite.models.arenas import TableArena
+    from robosuite.models.objects import BoxObject
+    from robosuite.models.tasks import ManipulationTask
+    from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
+    from robosuite.utils.mjcf_utils import CustomMaterial
+
+    ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
+
+    def wooden(box: Box) -> BoxObject:
+        material = CustomMaterial(
+            texture=box.texture,
+            tex_name=f"{box.name}_texture",
+            mat_name=f"{box.name}_material",
+            tex_attrib={"type": "cube"},
+            mat_attrib={"texrepeat": "1 1", "specular": "0.2", "shininess": "0.05"},
+        )
+        return BoxObject(
+            box.name,
+            size=[0.5 * extent for extent in box.size],
+            density=box.density,
+            friction=(1.0, 0.005, 0.0001),
+            material=material,
+            rng=np.random.default_rng(0),
+        )
+
+    class OneDemoTableScene(ManipulationEnv):
+        """Robot, table and boxes."""
+
+        def _load_model(self):
+            super()._load_model()
+            robots: Any = self.robots
+            robot_model = robots[0].robot_model
+            robot_model.set_base_xpos(robot_model.base_xpos_offset["table"](2 * TABLE_HALF_SIZE))
+            side = 2 * TABLE_HALF_SIZE
+            arena: Any = TableArena(table_full_size=(side, side, 0.05), table_offset=(0, 0, TABLE_HEIGHT))
+            arena.set_origin([0, 0, 0])
+            arena.table_visual.attrib.pop("material", None)
+            arena.table_visual.set("rgba", TABLE_COLOR)
+            self.boxes = [wooden(box) for box in boxes]
+            self.model = ManipulationTask(arena, [robot_model], self.boxes)
+            use_velocity_servos(self.model.root, set(robot_model.joints))
+            leave_out_unused(self.model.root)
+
+        def reward(self, action=None):
+            return 0.0
+
+    return OneDemoTableScene(
+        robots=robot,
+        controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
+        use_camera_obs=False,
+        has_renderer=False,
+        has_offscreen_renderer=False,
+        hard_reset=False,
+        ignore_done=True,
+        seed=0,
+    )
+
+
+def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    return mujoco.mj_name2id(model, kind, name)
+
+
+def _arm_index(model: mujoco.MjModel, env, robot: str, side: str) -> ArmIndex:
+    rob = env.robots[0]
+    gripper = rob.gripper[side]
+    count = len(rob.robot_joints) // len(rob.arms)
+    first = rob.arms.index(side) * count
+    names = rob.robot_joints[first : first + count]
+    site = gripper.important_sites["grip_site"]
+    arm = Arm.from_mujoco(model, names, site=site, velocity_limits=ROBOTS[robot], name=robot)
+    joints = np.array([model.joint(name).id for name in names])
+    ctrl = np.array([int(np.flatnonzero(model.actuator_trnid[:, 0] == joint)[0]) for joint in joints])
+    grip = np.array([model.actuator(name).id for name in gripper.actuators])
+    opened, closed = _gripper_controls(model, gripper, grip)
+    pads = (gripper.important_geoms["left_fingerpad"], gripper.important_geoms["right_fingerpad"])
+    return ArmIndex(
+        arm=arm,
+        qpos=model.jnt_qposadr[joints],
+        qvel=model.jnt_dofadr[joints],
+        ctrl=ctrl,
+        act=model.actuator_actadr[ctrl],
+        site=model.site(site).id,
+        pads=(model.geom(pads[0][0]).id, model.geom(pads[1][0]).id),
+        finger_qpos=np.array([model.joint(name).qposadr[0] for name in gripper.joints]),
+        grip=grip,
+        opened=opened,
+        closed=closed,
+    )
+
+
+def _gripper_controls(model: mujoco.MjModel, gripper, grip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Controls of the fingers when open and when closed, from the way robosuite drives that gripper."""
+    low, high = model.actuator_ctrlrange[grip].T
+    ends = []
+    for direction in (-1.0, 1.0):
+        for _ in range(100):  # robosuite's grippers move their command by a small step per call
+            normalized = gripper.format_action(np.array([direction]))
+        ends.append(low + 0.5 * (np.asarray(normalized) + 1.0) * (high - low))
+    return ends[0], ends[1]
+
+
+def _owners(model: mujoco.MjModel, env, boxes: tuple[Box, ...], bodies: list[int]):
+    rob = env.robots[0]
+    fingers = set()
+    for side in rob.arms:
+        geoms = rob.gripper[side].important_geoms
+        fingers |= {model.geom(name).id for key in ("left_finger", "right_finger") for name in geoms[key]}
+    owner, labels = np.zeros(model.ngeom, dtype=np.int64), []
+    for geom in range(model.ngeom):
+        body = int(model.geom_bodyid[geom])
+        name = model.body(body).name
+        if body in bodies:
+            owner[geom] = FIRST_OBJECT + bodies.index(body)
+            labels.append(boxes[bodies.index(body)].name)
+        elif geom in fingers:
+            owner[geom] = FINGERS
+            labels.append("fingers")
+        elif name.startswith(("robot", "gripper")):
+            owner[geom] = ARM
+            labels.append(name.split("_", 1)[1])
+        else:
+            labels.append("table" if "table" in name else name or "world")
+    return owner, tuple(labels)
