@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..planner.demo import Demonstration, Segment
 
 app = typer.Typer(
-    help="Look at a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="rich"
+    help="Look at a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="markdown"
 )
 
 
@@ -47,7 +47,7 @@ def check(
         out.print(f"  [bold]{segment.name}[/bold]", f"    {what}", f"    {screw}", sep="\n", soft_wrap=True)
     warnings = warnings_of(demo)
     for warning in warnings:
-        out.print(f"[yellow]warning[/yellow]  {warning}")
+        out.print(f"[yellow]warning[/yellow]  {warning}", soft_wrap=True)
     out.print("[green]ok[/green]" if not warnings else f"[green]ok[/green], with {len(warnings)} warnings")
 
 
@@ -70,9 +70,10 @@ def import_(
     are cut where the hand rests.
 
     Examples:
-    onedemo demo import panda_teleop_stack.npz --output stack.npz --licence MIT
 
-    onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100
+    - onedemo demo import panda_teleop_stack.npz --output stack.npz --licence MIT
+
+    - onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100
     """
     from ..planner.demo_io import save_demonstration
     from ..planner.recordings import from_pose_table, stack_from_teleoperation

@@ -246,7 +246,7 @@ def run_perf(pattern: str, json_file: Path | None) -> int:
             verdict = {True: "[green]ok[/green]    ", False: "[red]missed[/red]", None: "-     "}[line.ok]
             out.print(f"{verdict}  {line.name}: [bold]{value}[/bold] {goal}", soft_wrap=True)
             if line.note:
-                out.print(f"        [dim]{line.note}[/dim]", soft_wrap=True)
+                out.print(f"        {line.note}", soft_wrap=True, markup=False, style="dim")
     if json_file is not None:
         write_json(rows, json_file)
     return 1 if any(line.ok is False for line in rows) else 0

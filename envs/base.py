@@ -12,8 +12,8 @@ import numpy as np
 from ..planner.errors import BadAction, BadOption, UnknownName
 from ..planner.pose import Pose
 from . import spaces as space
+from .boxes import Box
 from .render import Ghost, Renderer
-from .scene import Box
 from .sim import PHYSICS_DT, Simulation
 from .state import State
 from .task import TaskDescription

@@ -1,9 +1,4 @@
-"""Scenes as compiled models: robosuite builds them, and this is the only file that touches it.
-
-robosuite's own controllers cost six times the physics and track a path badly; here every arm joint is MuJoCo's
-integrated-velocity servo: the control is a joint speed, its integral is held by a stiff position servo against
-gravity-free links.
-"""
+"""Compiled scenes, and where everything is in MuJoCo's arrays."""
 
 from __future__ import annotations
 
@@ -11,6 +6,7 @@ import copy
 import logging
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 import mujoco
@@ -18,27 +14,14 @@ import numpy as np
 
 from ..planner.arm import Arm
 from ..planner.errors import UnknownName
-from .servos import leave_out_unused, use_velocity_servos
+from .boxes import Box
 
-TABLE_HEIGHT = 0.8
-TABLE_HALF_SIZE = 0.4
-TABLE_COLOR = "0.78 0.74 0.68 1"
 ROBOTS = {
     "Panda": (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
 }
 """The robots that are supported, with their joint speed limits [rad/s] (the maker's data sheet)."""
 WORLD, ARM, FINGERS, FIRST_OBJECT = 0, 1, 2, 3
 """Who a geom belongs to: the table and the floor, an arm, its fingers, or object k as FIRST_OBJECT + k."""
-
-
-@dataclass(frozen=True)
-class Box:
-    """A free wooden box: name, full extents (3,) [m] and a robosuite texture name."""
-
-    name: str
-    size: tuple[float, float, float]
-    texture: str
-    density: float = 600.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +85,7 @@ def compiled_scene(robot: str, boxes: tuple[Box, ...]) -> Scene:
     """
     if robot not in ROBOTS:
         raise UnknownName("robot", robot, ROBOTS)
-    env = _table_env(robot, boxes)
+    env = _model_library().table_env(robot, boxes)
     model = copy.copy(env.sim.model._model)
     rob = env.robots[0]
     arms = tuple(_arm_index(model, env, robot, side) for side in rob.arms)
@@ -117,71 +100,14 @@ def robot_arm(robot: str, index: int = 0) -> Arm:
     return compiled_scene(robot, ()).arms[index].arm
 
 
-def _table_env(robot: str, boxes: tuple[Box, ...]) -> Any:
-    """A robosuite environment that is used for its model only."""
+def _model_library() -> Any:
+    """The module that builds models, imported late: robosuite takes seconds and warns of optional things."""
     before = logging.root.manager.disable
-    logging.disable(logging.WARNING)  # its import warns of optional things that are not used here
+    logging.disable(logging.WARNING)
     try:
-        import robosuite
+        return import_module(".table_model", __package__)
     finally:
         logging.disable(before)
-    from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
-    from robosuite.models.arenas import TableArena
-    from robosuite.models.objects import BoxObject
-    from robosuite.models.tasks import ManipulationTask
-    from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
-    from robosuite.utils.mjcf_utils import CustomMaterial
-
-    ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
-
-    def wooden(box: Box) -> BoxObject:
-        material = CustomMaterial(
-            texture=box.texture,
-            tex_name=f"{box.name}_texture",
-            mat_name=f"{box.name}_material",
-            tex_attrib={"type": "cube"},
-            mat_attrib={"texrepeat": "1 1", "specular": "0.2", "shininess": "0.05"},
-        )
-        return BoxObject(
-            box.name,
-            size=[0.5 * extent for extent in box.size],
-            density=box.density,
-            friction=(1.0, 0.005, 0.0001),
-            material=material,
-            rng=np.random.default_rng(0),
-        )
-
-    class OneDemoTableScene(ManipulationEnv):
-        """Robot, table and boxes."""
-
-        def _load_model(self):
-            super()._load_model()
-            robots: Any = self.robots
-            robot_model = robots[0].robot_model
-            robot_model.set_base_xpos(robot_model.base_xpos_offset["table"](2 * TABLE_HALF_SIZE))
-            side = 2 * TABLE_HALF_SIZE
-            arena: Any = TableArena(table_full_size=(side, side, 0.05), table_offset=(0, 0, TABLE_HEIGHT))
-            arena.set_origin([0, 0, 0])
-            arena.table_visual.attrib.pop("material", None)
-            arena.table_visual.set("rgba", TABLE_COLOR)
-            self.boxes = [wooden(box) for box in boxes]
-            self.model = ManipulationTask(arena, [robot_model], self.boxes)
-            use_velocity_servos(self.model.root, set(robot_model.joints))
-            leave_out_unused(self.model.root)
-
-        def reward(self, action=None):
-            return 0.0
-
-    return OneDemoTableScene(
-        robots=robot,
-        controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
-        use_camera_obs=False,
-        has_renderer=False,
-        has_offscreen_renderer=False,
-        hard_reset=False,
-        ignore_done=True,
-        seed=0,
-    )
 
 
 def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:

@@ -7,7 +7,8 @@ import copy
 import mujoco
 import numpy as np
 
-from .scene import ARM, FINGERS, ArmIndex, Box, compiled_scene
+from .boxes import Box
+from .scene import ARM, FINGERS, ArmIndex, compiled_scene
 from .state import State, read_arm, read_objects
 
 PHYSICS_DT = 0.002

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..planner.errors import BadOption, UnknownName
 from .base import OneDemoEnv
+from .boxes import TABLE_HEIGHT, Box
 from .layouts import TABLE_EDGE, Layout, level_named, stack_layout
 from .options import checked_joints, checked_poses
-from .scene import TABLE_HEIGHT, Box
 from .spaces import observation_space
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress, allowed_contact, shaped
 from .state import State

@@ -1,0 +1,85 @@
+"""The model of a robot at a table with boxes, built with robosuite: the only file that touches it.
+
+robosuite's own controllers cost six times the physics and track a path badly; here every arm joint is MuJoCo's
+integrated-velocity servo: the control is a joint speed, its integral is held by a stiff position servo against
+gravity-free links.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import robosuite
+from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
+from robosuite.models.arenas import TableArena
+from robosuite.models.objects import BoxObject
+from robosuite.models.tasks import ManipulationTask
+from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
+from robosuite.utils.mjcf_utils import CustomMaterial
+
+from .boxes import TABLE_HALF_SIZE, TABLE_HEIGHT, Box
+from .servos import leave_out_unused, use_velocity_servos
+
+TABLE_COLOR = "0.78 0.74 0.68 1"
+FRICTION = (1.0, 0.005, 0.0001)
+"""Of a box: sliding, torsional, rolling."""
+
+
+class OneDemoTableScene(ManipulationEnv):
+    """Robot, table and boxes; used for its model only."""
+
+    def __init__(self, robot: str, wanted: tuple[Box, ...]):
+        self.wanted = wanted
+        super().__init__(
+            robots=robot,
+            controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
+            use_camera_obs=False,
+            has_renderer=False,
+            has_offscreen_renderer=False,
+            hard_reset=False,
+            ignore_done=True,
+            seed=0,
+        )
+
+    def _load_model(self) -> None:
+        super()._load_model()
+        robots: Any = self.robots
+        robot_model, side = robots[0].robot_model, 2 * TABLE_HALF_SIZE
+        robot_model.set_base_xpos(robot_model.base_xpos_offset["table"](side))
+        arena: Any = TableArena(table_full_size=(side, side, 0.05), table_offset=(0, 0, TABLE_HEIGHT))
+        arena.set_origin([0, 0, 0])
+        arena.table_visual.attrib.pop("material", None)
+        arena.table_visual.set("rgba", TABLE_COLOR)
+        self.boxes = [_wooden(box) for box in self.wanted]
+        self.model = ManipulationTask(arena, [robot_model], self.boxes)
+        use_velocity_servos(self.model.root, set(robot_model.joints))
+        leave_out_unused(self.model.root)
+
+    def reward(self, action: Any = None) -> float:
+        """Nothing: robosuite asks for one."""
+        return 0.0
+
+
+def _wooden(box: Box) -> BoxObject:
+    material = CustomMaterial(
+        texture=box.texture,
+        tex_name=f"{box.name}_texture",
+        mat_name=f"{box.name}_material",
+        tex_attrib={"type": "cube"},
+        mat_attrib={"texrepeat": "1 1", "specular": "0.2", "shininess": "0.05"},
+    )
+    return BoxObject(
+        box.name,
+        size=[0.5 * extent for extent in box.size],
+        density=box.density,
+        friction=FRICTION,
+        material=material,
+        rng=np.random.default_rng(0),
+    )
+
+
+def table_env(robot: str, boxes: tuple[Box, ...]) -> Any:
+    """A robosuite environment with the compiled model of the scene."""
+    ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
+    return OneDemoTableScene(robot, boxes)
