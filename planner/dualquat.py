@@ -22,6 +22,8 @@ Array = np.ndarray
 CONJUGATE_8 = np.diag([1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0])
 CONJUGATE_8.flags.writeable = False
 UNIT_TOLERANCE = 1e-6
+ON_MANIFOLD = 1e-14
+"""Deviation from a unit dual quaternion that is rounding and nothing else."""
 
 
 class ScrewParameters(NamedTuple):
@@ -145,6 +147,8 @@ def normalized(x: ArrayLike) -> Array:
 def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
     """The input as float64 (..., 8), projected to the manifold if it is unit up to rounding.
 
+    What is unit to the last digits is left alone, so that checking twice changes no bit.
+
     Raises:
         BadShape, NotFinite, NotUnit: the input is not a unit dual quaternion within 1e-6.
     """
@@ -156,7 +160,9 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
     worst = np.abs(norms - 1.0).argmax() if norms.size else None
     if worst is not None and abs(norms.flat[worst] - 1.0) > UNIT_TOLERANCE:
         raise NotUnit(name, float(norms.flat[worst]))
-    return normalized(array)
+    slant = np.abs(np.sum(array[..., :4] * array[..., 4:], axis=-1))
+    off = (np.abs(norms - 1.0) > ON_MANIFOLD) | (slant > ON_MANIFOLD)
+    return np.where(off[..., None], normalized(array), array) if off.any() else array
 
 
 def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:
