@@ -13,6 +13,9 @@ from .chain import PRISMATIC, REVOLUTE
 from .errors import BadModel
 from .pose import Pose
 
+FARTHEST = 100.0
+"""A link longer than this [m] is a mistake."""
+
 
 class ChainData(NamedTuple):
     """What a robot model says of an arm.
@@ -124,6 +127,11 @@ def chain_from_urdf(path: str | Path, tcp_frame: str, world_from_base: Pose | No
         raise BadModel(source, f"frame {tcp_frame!r}", f"not in the model; frames: {frames}")
     frame = model.frames[model.getFrameId(tcp_frame)]
     joints = _pinocchio_joints(model, frame)
+    for name, placement in [
+        *((model.names[joint], model.jointPlacements[joint]) for joint in joints),
+        (tcp_frame, frame.placement),
+    ]:
+        _check_placement(source, name, placement.homogeneous)
     builder = _ChainBuilder()
     builder.move(world_from_base or Pose.identity())
     for joint in joints:
@@ -140,6 +148,14 @@ def chain_from_urdf(path: str | Path, tcp_frame: str, world_from_base: Pose | No
         np.where(circular, np.inf, model.upperPositionLimit[index_q]),
         model.velocityLimit[index_v],
     )
+
+
+def _check_placement(source: Path, name: str, matrix: np.ndarray) -> None:
+    """Refuse numbers that the loader lets pass: not finite, farther than 100 m, not a rotation."""
+    if not (np.isfinite(matrix).all() and np.abs(matrix[:3, 3]).max() <= FARTHEST):
+        raise BadModel(source, name, f"its origin is not finite or farther than {FARTHEST:g} m")
+    if np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max() > 1e-6:
+        raise BadModel(source, name, "its orientation is not a rotation")
 
 
 def _mujoco_pose(position: np.ndarray, wxyz: np.ndarray) -> Pose:
@@ -179,6 +195,8 @@ def _pinocchio_axis(model: Any, joint: int, source: Path) -> tuple[np.ndarray, n
         raise BadModel(source, f"joint {model.names[joint]!r}", "neither turns nor slides")
     jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
     column = jacobian[:, model.joints[joint].idx_v]
+    if not abs(np.linalg.norm(column) - 1.0) < 1e-6:
+        raise BadModel(source, f"joint {model.names[joint]!r}", "its axis is not a direction")
     if np.linalg.norm(column[3:]) > 0.5:
         return column[3:], np.zeros(3), REVOLUTE
     return column[:3], np.zeros(3), PRISMATIC
