@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ MAX_BYTES = 64 * 2**20
 UNIT_QUATERNION = 1e-3
 """Largest deviation of a quaternion's norm that counts as rounding (recordings in single precision, logs with four
 digits); beyond it the numbers are not a quaternion."""
+UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, SyntaxError, RuntimeError, ArithmeticError)
+"""What zipfile, zlib and NumPy raise on damaged files; encrypted or exotic archives are a RuntimeError."""
 TEXTS = ("name", "task", "robot", "tcp_frame", "source", "licence", "units")
 REQUIRED = (*TEXTS, "format_version", "time", "poses")
 OPTIONAL = (
@@ -115,7 +118,7 @@ def read_arrays(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]
                 raise BadDemonstration(path, "file", f"expands to {total} bytes; at most {max_bytes} are read")
         with np.load(path, allow_pickle=False) as data:
             return {key: data[key] for key in data.files}
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, OSError, ValueError) as error:
+    except UNREADABLE as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BadDemonstration(path, "file", f"is not a readable .npz file ({reason})") from None
 

@@ -33,7 +33,7 @@ def dwells(time: np.ndarray, path: PosePath) -> list[tuple[int, int]]:
 
 
 def resampled(path: PosePath, step: float) -> PosePath:
-    """The path in equal steps of screw length, at most `step` [m]; both ends are kept exactly.
+    """The path in equal steps of screw length along it, at most `step` [m]; both ends are kept exactly.
 
     Pauses and trembling no longer weigh in rules that count poses. Poses in between lie on the screw between
     their two neighbors: nothing is smoothed.

@@ -1,0 +1,220 @@
+"""Every way that a demonstration file can be bad, made by a mutator from the shipped one."""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+
+from onedemo.configs.shipped import shipped_demonstration
+from onedemo.planner.demo import warnings_of
+from onedemo.planner.demo_io import REQUIRED, load_demonstration, save_demonstration
+from onedemo.planner.errors import BadDemonstration, OneDemoError, UnknownName
+
+
+def shipped_arrays():
+    with np.load(shipped_demonstration("stack"), allow_pickle=False) as data:
+        return dict(data)
+
+
+def change(key, index, value):
+    def mutate(arrays):
+        arrays[key] = arrays[key].copy()
+        arrays[key][index] = value
+
+    return mutate
+
+
+def replace(key, value):
+    return lambda arrays: arrays.update({key: value(arrays) if callable(value) else np.array(value)})
+
+
+def drop(key):
+    return lambda arrays: arrays.pop(key)
+
+
+def scale(key, columns, factor):
+    def mutate(arrays):
+        arrays[key] = arrays[key].copy()
+        arrays[key][:, columns] *= factor
+
+    return mutate
+
+
+BAD = {
+    "nan position": (change("poses", (7, 1), np.nan), "poses: is not finite at index 7"),
+    "infinite position": (change("poses", (7, 1), np.inf), "poses: is not finite at index 7"),
+    "nan time": (change("time", 3, np.nan), "time: is not finite at index 3"),
+    "nan joint": (change("joint_positions", (5, 2), np.nan), "joint_positions: is not finite at index 5"),
+    "nan gripper": (change("gripper", 2, np.nan), "gripper: is not finite at index 2"),
+    "time goes back": (change("time", 4, 0.0), "time: does not increase at index 4"),
+    "time stands": (lambda a: change("time", 9, a["time"][8])(a), "time: does not increase at index 9"),
+    "long quaternion": (scale("poses", slice(3, 7), 1.01), "the quaternion at index .* has norm 1.01; expected 1"),
+    "zero quaternion": (change("poses", (6, slice(3, 7)), 0.0), "the quaternion at index 6 has norm 0; expected 1"),
+    "millimetres": (scale("poses", slice(0, 3), 1000.0), "m away; are the positions in cm or mm"),
+    "table 100 m away": (change("poses", (11, 0), 100.0), "path: sample 11 is 100 m away"),
+    "one sample": (lambda a: a.update(time=a["time"][:1], poses=a["poses"][:1]), "has 1 sample|has shape"),
+    "no samples": (replace("poses", np.zeros((0, 7))), "poses|path|content"),
+    "six columns": (replace("poses", lambda a: a["poses"][:, :6]), r"poses: has shape \(532, 6\); expected \(n, 7\)"),
+    "shorter time": (replace("time", lambda a: a["time"][:-1]), r"time: has shape \(531,\); expected \(532,\)"),
+    "shorter joints": (replace("joint_positions", lambda a: a["joint_positions"][:9]), "joint_positions: has shape"),
+    "text as time": (replace("time", lambda a: a["time"].astype(str)), "time: is not an array of numbers"),
+    "complex poses": (replace("poses", lambda a: a["poses"] + 0j), "poses: is not an array of numbers"),
+    "unknown robot": (replace("robot", "R2D2"), "robot: 'R2D2' is unknown; known: Panda, .*"),
+    "unknown source": (replace("source", "dreamt"), "source: 'dreamt' is not one of teleoperated, kinesthetic"),
+    "wrong units": (replace("units", "cm s deg xyzw"), "units: must be 'm s rad wxyz'; convert with"),
+    "number as name": (replace("name", 3), "name: is not a text"),
+    "newer version": (replace("format_version", 99), "format_version: is 99; this program reads 1"),
+    "text version": (replace("format_version", "1"), "format_version: is 1; this program reads 1"),
+    "unknown entry": (replace("colour", "red"), "colour: is unknown; allowed: "),
+    "segment behind the end": (change("segment_ranges", (1, 1), 99999), "segment 'transfer': samples .* not within 0"),
+    "segment backwards": (change("segment_ranges", (0, 1), 0), "segment 'approach': samples 0 to 0 are not within"),
+    "segments overlap": (change("segment_ranges", (1, 0), 5), "begins at 5, before the one before has ended"),
+    "doubled segment": (replace("segment_names", ["a", "a"]), "segments: names are not unique: a, a"),
+    "one name less": (replace("segment_names", ["a"]), "does not have 1 entries as segment_names has"),
+    "bad gripper word": (
+        replace("segment_gripper", ["squeeze", "open"]),
+        "gripper 'squeeze' is not one of close, open",
+    ),
+    "no segment ranges": (drop("segment_ranges"), "segment_ranges: is missing, although other segment entries"),
+    "tilted reference": (change("segment_reference_poses", (0, 3), 9.0), "segment_reference_poses: the quaternion at"),
+    "flat sizes": (replace("object_sizes", np.zeros((2, 2))), r"object_sizes: has shape \(2, 2\); expected \(2, 3\)"),
+    **{
+        f"no {key}": (drop(key), f"{key}: is missing; a demonstration holds: {', '.join(REQUIRED)}") for key in REQUIRED
+    },
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_demonstration_is_refused_in_one_line_that_names_file_and_key(name, tmp_path):
+    mutate, message = BAD[name]
+    arrays = shipped_arrays()
+    mutate(arrays)
+    path = tmp_path / "bad.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(BadDemonstration, match=message) as caught:
+        load_demonstration(path)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def npy(array) -> bytes:
+    out = io.BytesIO()
+    np.lib.format.write_array(out, np.asarray(array), allow_pickle=True)
+    return out.getvalue()
+
+
+class Attack:
+    def __reduce__(self):
+        return os.mkdir, ("attacked",)
+
+
+def zipped(path, entries):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in entries:
+            archive.writestr(name, content)
+
+
+def announce(shape) -> bytes:
+    out = io.BytesIO()
+    np.lib.format.write_array_header_1_0(out, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    return out.getvalue()
+
+
+FILES = {
+    "empty": lambda path: path.write_bytes(b""),
+    "text": lambda path: path.write_text("hello"),
+    "pickle": lambda path: path.write_bytes(pickle.dumps(Attack())),
+    "torn": lambda path: path.write_bytes(shipped_demonstration("stack").read_bytes()[:3000]),
+    "folder": lambda path: path.mkdir(),
+    "missing": lambda path: None,
+    "object array": lambda path: zipped(path, [("time.npy", npy(np.array([Attack()], dtype=object)))]),
+    "header bomb": lambda path: zipped(path, [("time.npy", announce((10**12,)))]),
+    "zip bomb": lambda path: zipped(path, [("time.npy", announce((9_000_000,)) + bytes(72_000_000))]),
+    "negative shape": lambda path: zipped(path, [("time.npy", announce((-5,)) + bytes(40))]),
+    "not an array": lambda path: zipped(path, [("time.npy", b"hello")]),
+    "outside": lambda path: zipped(path, [("../time.npy", npy(np.zeros(3)))]),
+    "other entry": lambda path: zipped(path, [("run.py", b"import os")]),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_hostile_file_is_refused_and_never_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "hostile.npz"
+    FILES[name](path)
+    with pytest.raises(BadDemonstration) as caught:
+        load_demonstration(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "attacked").exists()
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_doubled_members_are_refused(tmp_path):
+    zipped(tmp_path / "two.npz", [("time.npy", npy(np.zeros(3))), ("time.npy", npy(np.ones(3)))])
+    with pytest.raises(BadDemonstration, match="stands in the file twice"):
+        load_demonstration(tmp_path / "two.npz")
+
+
+def test_random_damage_is_an_error_of_ours_or_harmless(tmp_path):
+    data, rng, path = shipped_demonstration("stack").read_bytes(), np.random.default_rng(0), tmp_path / "damaged.npz"
+    refused = 0
+    for _ in range(150):
+        damaged = bytearray(data)
+        for position in rng.integers(0, len(data), rng.integers(1, 6)):
+            damaged[position] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            load_demonstration(path)
+        except OneDemoError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused > 100
+
+
+def test_saving_and_loading_keeps_everything(tmp_path):
+    demo = load_demonstration(shipped_demonstration("stack"))
+    save_demonstration(demo, tmp_path / "again.npz")
+    again = load_demonstration(tmp_path / "again.npz")
+    for key in ("name", "task", "robot", "tcp_frame", "source", "licence"):
+        assert getattr(again, key) == getattr(demo, key)
+    for key in ("time", "joint_positions", "gripper"):
+        np.testing.assert_array_equal(getattr(again, key), getattr(demo, key))
+    np.testing.assert_allclose(again.path.vectors, demo.path.vectors, atol=1e-15)
+    assert [s.name for s in again.segments] == ["approach", "transfer"]
+    for ours, theirs in zip(again.segments, demo.segments, strict=True):
+        assert (ours.start, ours.stop, ours.reference, ours.held, ours.gripper) == (
+            theirs.start,
+            theirs.stop,
+            theirs.reference,
+            theirs.held,
+            theirs.gripper,
+        )
+        assert ours.reference_pose.gap(theirs.reference_pose) < (1e-12, 1e-12)
+    np.testing.assert_array_equal(again.object_sizes["cubeA"], [0.04] * 3)
+
+
+def test_rounded_quaternions_are_accepted_and_made_unit(tmp_path):
+    arrays = shipped_arrays()
+    arrays["poses"] = arrays["poses"].astype(np.float32).round(4)
+    np.savez(tmp_path / "rounded.npz", **arrays)
+    quaternions = load_demonstration(tmp_path / "rounded.npz").path.quaternions
+    np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1, atol=1e-14)
+
+
+def test_segments_are_found_by_name():
+    demo = load_demonstration(shipped_demonstration("stack"))
+    assert len(demo.segment_path("approach")) == demo.segment("approach").stop + 1
+    with pytest.raises(UnknownName, match="known: approach, transfer"):
+        demo.segment("pour")
+
+
+def test_warnings_tell_of_pauses_and_tilt():
+    text = "\n".join(warnings_of(load_demonstration(shipped_demonstration("stack"))))
+    assert "pause of 0.9 s" in text
+    assert "tilted" in text

@@ -1,0 +1,128 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arms import READY, panda
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import assert_same_pose
+
+from onedemo.planner import dualquat as dq
+from onedemo.planner.controller import ControllerSettings
+from onedemo.planner.errors import BadOption
+from onedemo.planner.pose import Pose, PosePath
+from onedemo.planner.pursuit import ARRIVED, FOLLOWING, STALLED, Pursuit, PursuitSettings
+from onedemo.planner.tsia import screw_path
+
+DT = 0.02
+few = settings(max_examples=25, deadline=None)
+UNHURRIED = ControllerSettings(null_gain=0.0, max_linear=1e3, max_angular=1e3)
+
+
+def a_path(seed=0, step=0.005):
+    """A screw that the Panda can follow."""
+    rng = np.random.default_rng(seed)
+    arm = panda()
+    goal = arm.fk(READY + rng.uniform(-0.15, 0.15, 7))
+    return arm, screw_path(arm.fk(READY), goal, step)
+
+
+@few
+@given(st.integers(0, 10**6))
+def test_a_followed_path_ends_at_its_end(seed):
+    arm, path = a_path(seed)
+    result = Pursuit(arm, path, DT).roll_out(READY)
+    assert (result.arrived, result.reason) == (True, "")
+    distance, angle = arm.fk(result.q).gap(path[-1])
+    assert distance <= 1e-3
+    assert angle <= 1e-2
+    assert result.margin <= min(arm.margin(q) for q in result.trace) + 1e-12
+
+
+def test_a_roll_out_is_the_same_bits_as_stepping():
+    arm, path = a_path(3)
+    pursuit, q, trace = Pursuit(arm, path, DT), READY.copy(), [READY]
+    while (step := pursuit.step(q))[0] == FOLLOWING:
+        q = q + DT * step[1]
+        trace.append(q)
+    assert step[0] == ARRIVED
+    np.testing.assert_array_equal(Pursuit(arm, path, DT).roll_out(READY).trace, trace)
+
+
+def test_a_fraction_of_the_screw_slows_the_gain_down_and_still_arrives():
+    arm, path = a_path(1)
+    slow = PursuitSettings(tau=0.1)
+    first = Pursuit(arm, path, DT, controller=UNHURRIED).step(READY)[1]
+    tenth = Pursuit(arm, path, DT, controller=UNHURRIED, settings=slow).step(READY)[1]
+    np.testing.assert_allclose(tenth, 0.1 * first, atol=1e-9)
+    assert Pursuit(arm, path, DT, settings=slow).roll_out(READY).arrived
+
+
+@pytest.mark.parametrize("tau", [1.0, 0.3, 0.01])
+def test_ideal_tracking_is_the_recurrence_of_screw_steps(tau):
+    """c <- S(tau gain dt; c, d): the commanded twist, kept for a tick, is that fraction of the screw."""
+    arm, path = a_path(2, step=0.004)
+    settings_ = PursuitSettings(tau=tau)
+    pursuit, q = Pursuit(arm, path, DT, controller=UNHURRIED, settings=settings_), READY.copy()
+    for _ in range(30):
+        status, qdot = pursuit.step(q)
+        x, body = arm.fk_jacobian(q)
+        if status == FOLLOWING and np.abs(qdot).max() < 2.0:
+            moved = dq.mul(x, dq.dq_from_twist(DT * body @ qdot))
+            target = path[pursuit.index].dq
+            assert_same_pose(moved, dq.sclerp(x, target, tau * UNHURRIED.gain * DT), 1e-10)
+        q = q + DT * qdot
+
+
+def test_the_reference_never_goes_back_and_stays_at_the_end():
+    arm, path = a_path(4)
+    pursuit, q, indices = Pursuit(arm, path, DT), READY.copy(), []
+    for k in range(300):
+        status, qdot = pursuit.step(q)
+        indices.append(pursuit.index)
+        q = q + DT * qdot + (1e-3 * np.sin(k) if status == FOLLOWING else 0.0)
+    assert (np.diff(indices) >= 0).all()
+    assert indices[-1] == len(path) - 1
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_short_and_repeated_paths_are_followed(count):
+    arm, path = a_path(5)
+    assert Pursuit(arm, path[len(path) - count :], DT).roll_out(READY).arrived
+    doubled = PosePath(np.repeat(path.dqs, 3, axis=0) * np.resize([1.0, -1.0], 3 * len(path))[:, None])
+    assert Pursuit(arm, doubled, DT).roll_out(READY).arrived
+
+
+def test_out_of_reach_is_a_stall_and_too_long_is_a_timeout():
+    arm, path = a_path(6)
+    far = screw_path(arm.fk(READY), Pose.from_yaw([3.0, 0, 0.3], 0), 0.05)
+    result = Pursuit(arm, far, DT).roll_out(READY)
+    assert (result.arrived, result.reason) == (False, "ik_or_limit")
+    assert np.isfinite(result.q).all()
+    assert Pursuit(arm, path, DT).roll_out(READY, max_seconds=0.1).reason == "timeout"
+    pursuit, q, status = Pursuit(arm, far, DT), READY.copy(), FOLLOWING
+    for _ in range(3000):
+        status, qdot = pursuit.step(q)
+        if status != FOLLOWING:
+            break
+        q = q + DT * qdot
+    assert status == STALLED
+
+
+def test_the_papers_rule_advances_every_tick_and_is_late():
+    arm, path = a_path(7, step=0.001)
+    settings_ = PursuitSettings(rule="paper", tau=0.01)
+    pursuit, q = Pursuit(arm, path, DT, settings=settings_), READY.copy()
+    for k in range(len(path) - 1):
+        _, qdot = pursuit.step(q)
+        assert pursuit.index == k + 1
+        q = q + DT * qdot
+    assert arm.fk(q).gap(path[-1])[0] > 0.5 * path.lengths()[-1] * 0.2
+
+
+@pytest.mark.parametrize("change", [{"tau": 0.0}, {"tau": 1.1}, {"rule": "fast"}, {"capture_radius": -1.0}])
+def test_bad_settings_are_named(change):
+    with pytest.raises(BadOption, match=next(iter(change))):
+        PursuitSettings(**change)
+    with pytest.raises(BadOption, match=r"gain \* dt"):
+        Pursuit(panda(), a_path()[1], 0.1)
