@@ -51,19 +51,23 @@ def make_policy(
 
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:
     """A settings dataclass, nested ones included, from mappings as YAML gives them."""
+    _refuse_unknown(kind, values, source, "")
     try:
         return TypeAdapter(kind).validate_python(dict(values), strict=False)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        if first["type"] == "unexpected_keyword_argument":
-            raise BadConfig(source, key, f"unknown key; allowed: {', '.join(_allowed(kind, first['loc']))}") from None
-        raise BadConfig(source, key, first["msg"]) from None
+        raise BadConfig(source, key, f"{first['msg']}, got {first['input']!r}") from None
     except OneDemoError as error:
         raise BadConfig(source, "", str(error)) from None
 
 
-def _allowed(kind: type, location: tuple[str | int, ...]) -> list[str]:
-    for part in location[:-1]:
-        kind = get_type_hints(kind)[str(part)]
-    return [field.name for field in fields(kind)] if is_dataclass(kind) else []
+def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:
+    """Refuse keys that no field has: validation of dataclasses would pass over them."""
+    if not (is_dataclass(kind) and isinstance(values, Mapping)):
+        return
+    allowed, types = [field.name for field in fields(kind)], get_type_hints(kind)
+    for key, value in values.items():
+        if key not in allowed:
+            raise BadConfig(source, f"{prefix}{key}", f"unknown key; allowed: {', '.join(allowed)}")
+        _refuse_unknown(types[key], value, source, f"{prefix}{key}.")

@@ -77,7 +77,7 @@ def main() -> None:
     from ..planner.errors import OneDemoError
 
     try:
-        app()
+        app(prog_name="onedemo")
     except OneDemoError as error:
         console(stderr=True).print(f"[red]error[/red]  {_plain(str(error))}", soft_wrap=True)
         sys.exit(USAGE_ERROR)

@@ -70,7 +70,6 @@ def import_(
     are cut where the hand rests.
 
     Examples:
-
     - onedemo demo import panda_teleop_stack.npz --output stack.npz --licence MIT
 
     - onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100

@@ -137,7 +137,7 @@ def test_resampling_keeps_ends_and_makes_equal_steps():
         assert_same_pose(out.dqs[[0, -1]], path.dqs[[0, -1]], 1e-15)
         steps = np.diff(out.lengths())
         assert steps.max() <= 0.0101, "a step round a corner of the path is measured along the path"
-        assert np.median(steps) == pytest.approx(steps.max(), rel=1e-3)
+        assert np.median(steps) == pytest.approx(steps.max(), rel=3e-3)
     assert_same_pose(resampled(path, 0.01).dqs, resampled(paused, 0.01).dqs, 1e-9)
 
 

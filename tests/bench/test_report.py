@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+from example_records import RECORD, some
+
+from onedemo.bench.report import report_text, summary_row, verdict, write_summary
+from onedemo.bench.scenarios import scenarios_of
+from onedemo.bench.statistics import median, quantile, wilson
+from onedemo.configs.schema import load_config
+from onedemo.configs.shipped import shipped_config
+
+CONFIG = load_config(shipped_config("stack"))
+FAILED = replace(
+    RECORD, index=4, seed=104, success=False, failure_reason="dropped", stage="lifted block 2 of 3", detail="slipped"
+)
+REQUIRED = (
+    "method", "task", "robot", "level", "episodes", "successes", "safe_successes", "wilson_low", "wilson_high",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "successes, episodes, low, high",
+    [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (49, 50, 0.8950, 0.9965), (81, 263, 0.2553, 0.3662)],
+)
+def test_the_interval_is_wilsons(successes, episodes, low, high):
+    """The last line: Newcombe 1998, table I."""
+    assert wilson(successes, episodes) == (pytest.approx(low, abs=2e-4), pytest.approx(high, abs=2e-4))
+
+
+def test_statistics_of_nothing_say_so():
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert math.isnan(median([]))
+    assert math.isnan(quantile([], 0.99))
+
+
+def test_a_row_counts_what_happened(tmp_path):
+    unsafe = replace(RECORD, index=5, safe=False, collision="link5-block1")
+    row = summary_row(CONFIG, [*some(4), FAILED, unsafe])
+    assert set(REQUIRED) <= set(row)
+    assert (row["episodes"], row["successes"], row["safe_successes"]) == (6, 5, 4)
+    assert row["failures"] == {"dropped": 1}
+    assert row["position_error_mm_max"] == pytest.approx(2.0)
+    write_summary(tmp_path / "summary.json", [row])
+    assert json.loads((tmp_path / "summary.json").read_text())["rows"][0]["successes"] == 5
+    assert len(verdict(row)) == 3
+    assert "5 of 6 succeeded" in verdict(row)[0]
+
+
+def test_a_report_explains_every_failure_and_contact():
+    unsafe = replace(RECORD, index=5, seed=105, safe=False, collision="link5-block1")
+    records = [*some(3), FAILED, unsafe]
+    text = report_text(CONFIG, records, summary_row(CONFIG, records), ["note"], "onedemo run stack")
+    assert "| 4 | 104 | dropped | lifted block 2 of 3 | slipped |" in text
+    assert "- seed 105: link5-block1" in text
+    assert "onedemo run stack" in text
+    clean = report_text(CONFIG, some(3), summary_row(CONFIG, some(3)), [], "c")
+    assert "## Failures\n\nNone." in clean
+
+
+def test_a_run_without_any_success_still_has_a_report():
+    row = summary_row(CONFIG, [FAILED])
+    assert "0 of 1 succeeded" in report_text(CONFIG, [FAILED], row, [], "c")
+
+
+@pytest.mark.parametrize(
+    "hostile", ["<script>alert(1)</script>", "a|b|c", "x\n# title\n", "[l](javascript:x)", "y" * 10**6]
+)
+def test_words_of_others_stay_words(hostile):
+    records = [replace(FAILED, detail=hostile, stage=hostile)]
+    text = report_text(CONFIG, records, summary_row(CONFIG, records), [], "c")
+    assert "<script>" not in text.replace("\\<", "")
+    assert "](javascript" not in text.replace("\\]", "")
+    assert "\n# title" not in text
+    assert len(text) < 5000
+    (line,) = [line for line in text.splitlines() if line.startswith("| 4 |")]
+    assert line.replace("\\|", "").count("|") == 6
+
+
+def test_scenarios_depend_on_seed_and_count_only():
+    longer = CONFIG.model_copy(update={"episodes": 20, "seed": 5, "method": "other"})
+    assert [scenario.seed for scenario in scenarios_of(longer)] == list(range(5, 25))
+    assert scenarios_of(CONFIG) == [s for s in scenarios_of(CONFIG.model_copy(update={"episodes": 20}))][:10]
