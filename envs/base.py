@@ -22,7 +22,7 @@ CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
 MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
 """Tcp speeds [m/s, rad/s] of a full `ee_twist` action."""
-TWIST_DAMPING = 0.05
+TWIST_DAMPING = 0.02
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
 Observation = dict[str, np.ndarray]
 

@@ -36,7 +36,9 @@ class Simulation:
         self._offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
         self._read_index = [np.array([*arm.qpos, *arm.qvel, arm.site, *arm.pads]) for arm in arms]
         self._home_side = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
-        self._arm_views = (data.qpos, data.qvel, data.site_xpos, data.site_xmat, data.geom_xpos)
+        self._arm_views = (data.qpos, data.qvel, data.site_xmat, data.geom_xpos)
+        self._frames = np.empty((arms[0].arm.dof, 6))
+        self._object_places = model.jnt_qposadr[model.body_jntadr[self.scene.objects]]
         self._object_dofs = model.body_dofadr[self.scene.objects]
 
     def reset(self, joints: np.ndarray, object_poses: np.ndarray) -> None:
@@ -52,8 +54,7 @@ class Simulation:
             self.data.act[arm.act] = q
             self.data.ctrl[arm.grip] = arm.opened
             self.data.qpos[arm.finger_qpos] = arm.opened
-        for body, pose in zip(self.scene.objects, object_poses, strict=True):
-            address = self._free_joint(body)
+        for address, pose in zip(self._object_places, object_poses, strict=True):
             self.data.qpos[address : address + 7] = pose
         mujoco.mj_forward(self.model, self.data)
 
@@ -74,10 +75,11 @@ class Simulation:
         """The state now, in new arrays."""
         data, count, dof = self.data, len(self.scene.arms), self.scene.arms[0].arm.dof
         rows = np.empty((count, 2 * dof + 8))
-        for row, index, home, offset in zip(rows, self._read_index, self._home_side, self._offsets, strict=True):
-            read_arm(*self._arm_views, index, home, offset, row)
+        for k, arm in enumerate(self.scene.arms):
+            index, home, offset = self._read_index[k], self._home_side[k], self._offsets[k]
+            read_arm(*self._arm_views, arm.arm.chain, self._frames, index, home, offset, rows[k])
         poses, velocities = np.empty((len(self.scene.objects), 7)), np.empty((len(self.scene.objects), 3))
-        read_objects(data.qvel, data.xpos, data.xquat, self.scene.objects, self._object_dofs, poses, velocities)
+        read_objects(data.qpos, data.qvel, self._object_places, self._object_dofs, poses, velocities)
         tcp = 2 * dof
         return State(rows[:, :dof], rows[:, dof:tcp], rows[:, tcp : tcp + 7], rows[:, tcp + 7], poses, velocities)
 
@@ -96,9 +98,6 @@ class Simulation:
         geoms = self.data.contact.geom
         hit = np.flatnonzero(self._pair_codes[geoms[:, 0], geoms[:, 1]] == pair[0] * PAIR_BASE + pair[1])[0]
         return "-".join(sorted(self.scene.labels[geom] for geom in geoms[hit]))
-
-    def _free_joint(self, body: int) -> int:
-        return int(self.model.jnt_qposadr[self.model.body_jntadr[body]])
 
     def _pad_distance(self, arm: ArmIndex) -> float:
         left, right = self.data.geom_xpos[arm.pads[0]], self.data.geom_xpos[arm.pads[1]]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from ..planner.chain import forward
 from ..planner.jit import kernel
+from ..planner.screw import translation
 
 
 class State(NamedTuple):
@@ -31,24 +32,6 @@ class State(NamedTuple):
 
 
 @kernel
-def _quaternion(m, out):
-    """Quaternion wxyz of a rotation matrix (9,), from its largest diagonal combination."""
-    trace = m[0] + m[4] + m[8]
-    if trace > 0.0:
-        s = 2.0 * math.sqrt(1.0 + trace)
-        out[0], out[1], out[2], out[3] = 0.25 * s, (m[7] - m[5]) / s, (m[2] - m[6]) / s, (m[3] - m[1]) / s
-    elif m[0] >= m[4] and m[0] >= m[8]:
-        s = 2.0 * math.sqrt(1.0 + m[0] - m[4] - m[8])
-        out[0], out[1], out[2], out[3] = (m[7] - m[5]) / s, 0.25 * s, (m[1] + m[3]) / s, (m[2] + m[6]) / s
-    elif m[4] >= m[8]:
-        s = 2.0 * math.sqrt(1.0 + m[4] - m[0] - m[8])
-        out[0], out[1], out[2], out[3] = (m[2] - m[6]) / s, (m[1] + m[3]) / s, 0.25 * s, (m[5] + m[7]) / s
-    else:
-        s = 2.0 * math.sqrt(1.0 + m[8] - m[0] - m[4])
-        out[0], out[1], out[2], out[3] = (m[3] - m[1]) / s, (m[2] + m[6]) / s, (m[5] + m[7]) / s, 0.25 * s
-
-
-@kernel
 def _face(quaternion, reference):
     """Give a quaternion the sign that is nearer to a reference."""
     dot = 0.0
@@ -60,36 +43,38 @@ def _face(quaternion, reference):
 
 
 @kernel
-def read_arm(qpos, qvel, site_xpos, site_xmat, geom_xpos, index, home, offset, out):
+def read_arm(qpos, qvel, site_xmat, geom_xpos, chain, frames, index, home, offset, out):
     """One arm into `out` (2 dof + 8,): joints, speeds, tcp pose, opening.
 
-    `index` (2 dof + 3,) holds the addresses of positions and speeds, the site and the two pads; `home` (4,) the
-    quaternion whose side the tcp's is given; `offset` [m] turns the distance of the pads' centers into their gap.
+    The tcp is the forward kinematics of these joints: MuJoCo's own frames are one physics step older than its
+    positions. `index` (2 dof + 3,) holds the addresses of positions and speeds, the site and the two pads; `home`
+    (4,) the quaternion whose side the tcp's is given; `offset` [m] turns the distance of the pads into their gap.
     """
     dof = (len(index) - 3) // 2
     for j in range(dof):
         out[j] = qpos[index[j]]
         out[dof + j] = qvel[index[dof + j]]
+    x = forward(chain, out[:dof], frames)
+    place, tcp = translation(x), 2 * dof
     site, left, right = index[2 * dof], index[2 * dof + 1], index[2 * dof + 2]
-    tcp = 2 * dof
     gap = 0.0
     for k in range(3):
-        out[tcp + k] = site_xpos[site, k]
+        out[tcp + k] = place[k]
         # the fingers close along the x axis of the tcp
         gap += (geom_xpos[left, k] - geom_xpos[right, k]) * site_xmat[site, 3 * k]
-    _quaternion(site_xmat[site], out[tcp + 3 : tcp + 7])
+    for k in range(4):
+        out[tcp + 3 + k] = x[k]
     _face(out[tcp + 3 : tcp + 7], home)
     out[tcp + 7] = max(0.0, abs(gap) + offset)
 
 
 @kernel
-def read_objects(qvel, xpos, xquat, bodies, dofs, poses, velocities):
-    """All free bodies: poses (n, 7) with w >= 0 and linear velocities (n, 3)."""
-    for i in range(len(bodies)):
-        body = bodies[i]
-        sign = -1.0 if xquat[body, 0] < 0.0 else 1.0
+def read_objects(qpos, qvel, places, dofs, poses, velocities):
+    """All free bodies: poses (n, 7) with w >= 0 and linear velocities (n, 3), at these addresses."""
+    for i in range(len(places)):
+        sign = -1.0 if qpos[places[i] + 3] < 0.0 else 1.0
         for k in range(3):
-            poses[i, k] = xpos[body, k]
+            poses[i, k] = qpos[places[i] + k]
             velocities[i, k] = qvel[dofs[i] + k]
         for k in range(4):
-            poses[i, 3 + k] = sign * xquat[body, k]
+            poses[i, 3 + k] = sign * qpos[places[i] + 3 + k]

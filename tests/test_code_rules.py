@@ -17,7 +17,7 @@ LOWER = {
     "configs": {"planner"},
     "bench": {"planner", "envs", "baselines", "configs"},
 }
-ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit"}
+ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit", "chain", "screw"}
 """The planner's lowest floor."""
 PLANNER_ORDER = [
     "errors",

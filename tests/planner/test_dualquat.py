@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 import pytransform3d.transformations as pt
 import scipy.linalg
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from strategies import ANGLES, ANY_ANGLE, assert_same_pose, dqs, gentle_dqs, random_dq
+from strategies import ANGLES, assert_same_pose, dqs, for_all, random_dq
 
 from onedemo.planner import dualquat as dq
 from onedemo.planner.errors import BadShape, NotFinite, NotUnit
@@ -18,10 +18,6 @@ from onedemo.planner.pose import Pose
 
 taus = st.floats(0, 1)
 small_or_any = st.one_of(st.sampled_from(ANGLES[:-3]), st.floats(0, np.pi - 1e-3))
-
-
-def for_all(*args, **kwargs):
-    return lambda test: settings(max_examples=80, deadline=None)(given(*args, **kwargs)(test))
 
 
 def between(a, b):
@@ -41,8 +37,9 @@ def test_ten_thousand_projected_products_stay_on_the_manifold():
     x = dq.identity()
     for factor in factors:
         x = dq.normalized(dq.mul(x, factor))
-        assert abs(np.linalg.norm(x[:4]) - 1) < 1e-12
-        assert abs(x[:4] @ x[4:]) < 1e-12
+        assert abs(np.linalg.norm(x[:4]) - 1) < 1e-12 and abs(x[:4] @ x[4:]) < 1e-12
+    np.testing.assert_array_equal(dq.checked_unit(factors), factors)
+    np.testing.assert_allclose(dq.checked_unit((1 - 9e-7) * factors), factors, rtol=0, atol=1e-14)
 
 
 @for_all(dqs(), st.floats(0.5, 2), st.floats(-1, 1))
@@ -67,9 +64,10 @@ def test_translation_of_a_product_composes(a, b):
 
 @pytest.mark.parametrize("angle", ANGLES)
 @for_all(data=st.data())
-def test_exp_inverts_log_at_every_angle(angle, data):
+def test_logarithm_and_screw_parameters_can_be_undone_at_every_angle(angle, data):
     x = data.draw(dqs(angles=st.just(angle)))
     assert_same_pose(dq.exp(dq.log(x)), x, 1e-12)
+    assert_same_pose(dq.dq_from_screw_parameters(dq.screw_parameters(x)), x, 1e-12)
     assert np.linalg.norm(dq.twist_from_dq(x)[3:]) == pytest.approx(angle, rel=1e-12, abs=1e-15)
 
 
@@ -136,8 +134,9 @@ def test_the_long_way_is_taken_on_purpose_only():
 
 
 @for_all(dqs(), dqs(), taus, dqs(), dqs())
-def test_interpolation_moves_with_world_and_tool(a, b, tau, g, h):
+def test_interpolation_moves_with_world_and_tool_and_can_be_reversed(a, b, tau, g, h):
     assume(abs(between(a, b)[0]) > 1e-6)
+    assert_same_pose(dq.sclerp(b, a, 1 - tau), dq.sclerp(a, b, tau), 1e-12)
     moved = dq.sclerp(dq.mul(g, dq.mul(a, h)), dq.mul(g, dq.mul(b, h)), tau)
     assert_same_pose(moved, dq.mul(g, dq.mul(dq.sclerp(a, b, tau), h)), 1e-11)
 
@@ -153,23 +152,16 @@ def test_the_decoupled_interpolation_goes_straight_but_does_not_move_with_the_to
     assert dq.pose_error(retooled, dq.mul(path[2], h)) > 1e-2
 
 
-@for_all(dqs(), dqs(), taus)
-def test_interpolation_can_be_reversed(a, b, tau):
-    assume(abs(between(a, b)[0]) > 1e-6)
-    assert_same_pose(dq.sclerp(a, b, tau), dq.sclerp(b, a, 1 - tau), 1e-12)
-
-
 @for_all(dqs(), dqs(angles=st.floats(1e-3, np.pi - 1e-2)), taus)
 def test_interpolation_agrees_with_matrix_exponentials(a, motion, tau):
-    matrix, logarithm = Pose(motion).matrix, scipy.linalg.logm(Pose(motion).matrix).real
+    logarithm = scipy.linalg.logm(Pose(motion).matrix).real
     v, w = logarithm[:3, 3], logarithm[[2, 0, 1], [1, 2, 0]]
     np.testing.assert_allclose(dq.twist_from_dq(motion), np.concatenate([v, w]), rtol=0, atol=1e-10)
     expected = Pose(a).matrix @ scipy.linalg.expm(tau * logarithm)
     np.testing.assert_allclose(Pose(dq.sclerp(a, dq.mul(a, motion), tau)).matrix, expected, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(scipy.linalg.expm(logarithm), matrix, rtol=0, atol=1e-10)
 
 
-@for_all(gentle_dqs(), dqs(angles=st.floats(1e-2, np.pi - 1e-2)), taus)
+@for_all(dqs(), dqs(angles=st.floats(1e-2, np.pi - 1e-2)), taus)
 def test_interpolation_and_screw_agree_with_an_independent_library(a, motion, tau):
     b = dq.mul(a, motion)
     assert_same_pose(dq.sclerp(a, b, tau), pt.dual_quaternion_sclerp(a, b, tau), 1e-10)
@@ -186,20 +178,13 @@ def test_a_screw_fixes_its_axis_and_slides_along_it(x, along):
     point = screw.point + along * screw.axis
     slid = point + screw.travel * screw.axis
     np.testing.assert_allclose(pose.rotation @ point + pose.position, slid, rtol=0, atol=1e-10)
-    assert abs(screw.point @ screw.axis) < 1e-10
-    assert 0 <= screw.angle <= np.pi + 1e-12
-
-
-@for_all(dqs(angles=ANY_ANGLE))
-def test_screw_parameters_round_trip(x):
-    assert_same_pose(dq.dq_from_screw_parameters(dq.screw_parameters(x)), x, 1e-12)
+    assert abs(screw.point @ screw.axis) < 1e-10 and 0 <= screw.angle <= np.pi + 1e-12
 
 
 def test_a_pure_translation_has_infinite_pitch_and_keeps_its_travel():
     screw = dq.screw_parameters(dq.from_position_quaternion([0.0, 0.3, -0.4], [1, 0, 0, 0]))
     assert (screw.angle, screw.travel, screw.pitch) == (0.0, pytest.approx(0.5), np.inf)
-    np.testing.assert_allclose(screw.axis, [0, 0.6, -0.8])
-    np.testing.assert_array_equal(screw.moment, np.zeros(3))
+    np.testing.assert_allclose([*screw.axis, *screw.moment], [0, 0.6, -0.8, 0, 0, 0])
     rest = dq.screw_parameters(dq.identity())
     assert (rest.angle, rest.travel, *rest.axis) == (0.0,) * 5
 
@@ -251,10 +236,9 @@ def test_signs_are_made_continuous():
     [
         (lambda: dq.mul(np.zeros(7), dq.identity()), BadShape, r"a has shape \(7,\); expected \(\.\.\., 8\)"),
         (lambda: dq.sclerp(dq.identity(), np.zeros(4), 0.5), BadShape, r"end has shape \(4,\)"),
-        (lambda: dq.translation(3.0), BadShape, r"dual quaternion has shape \(\); expected"),
         (lambda: dq.dq_from_twist(np.zeros(8)), BadShape, r"twist has shape \(8,\); expected \(\.\.\., 6\)"),
         (lambda: dq.screw_parameters(np.zeros((2, 8)) + dq.identity()), BadShape, r"expected \(8,\)"),
-        (lambda: dq.checked_unit(np.diag([1.0, np.nan]) @ np.ones((2, 8))), NotFinite, r"index \(0, 0\)"),
+        (lambda: dq.checked_unit(np.diag([1.0, np.nan]) @ np.ones((2, 8))), NotFinite, r"index \(1, 0\)"),
         (lambda: dq.checked_unit([1.0, *[0.0] * 6, np.inf], "goal"), NotFinite, r"goal .* at index \(7,\)"),
         (lambda: dq.checked_unit([2.0, *[0.0] * 7]), NotUnit, "norm 2; expected 1"),
         (lambda: dq.checked_unit([1 + 2e-6, *[0.0] * 7]), NotUnit, r"norm 1\.000002"),
@@ -264,10 +248,3 @@ def test_bad_input_is_named_in_one_line(call, error, message):
     with pytest.raises(error, match=message) as caught:
         call()
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("scale", [1 - 9e-7, 1 + 9e-7])
-def test_rounding_is_projected_away(scale):
-    x = random_dq(np.random.default_rng(5), 3)
-    np.testing.assert_allclose(dq.checked_unit(scale * x), x, rtol=0, atol=1e-14)
-    np.testing.assert_array_equal(dq.checked_unit(x), x)

@@ -1,0 +1,218 @@
+"""What every environment id promises."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import onedemo.envs
+from onedemo.planner.errors import BadAction, OneDemoError, RenderingUnavailable
+
+ALL = sorted(onedemo.envs.IDS)
+each_id = pytest.mark.parametrize("name", ALL)
+MODES = ("joint_velocity", "ee_twist")
+
+
+@pytest.fixture(scope="module", params=ALL)
+def env(request):
+    made = gym.make(request.param)
+    yield made
+    made.close()
+
+
+def episode_hash(env, seed, steps=100, **options):
+    """Digest of everything that an episode says, to the bit."""
+    digest = hashlib.sha256()
+    rng = np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed, options=options)
+    for _ in range(steps):
+        for key in sorted(observation):
+            digest.update(observation[key].tobytes())
+        for key in sorted(info):
+            value = info[key]
+            digest.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
+        observation, reward, terminated, truncated, info = env.step(rng.uniform(-1, 1, env.action_space.shape))
+        digest.update(repr((reward, terminated, truncated)).encode())
+    return digest.hexdigest()
+
+
+@each_id
+@pytest.mark.parametrize("mode", MODES)
+def test_gymnasiums_checker_has_nothing_to_say(name, mode):
+    env = gym.make(name, control_mode=mode)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_the_same_seed_gives_the_same_bits(env):
+    first = episode_hash(env, 7)
+    episode_hash(env, 8, level="L2")
+    assert episode_hash(env, 7) == first
+    assert episode_hash(gym.make(env.spec.id), 7) == first
+    assert episode_hash(env, 8) != first
+
+
+def test_another_process_gives_the_same_bits(env, tmp_path):
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import gymnasium; from test_contract import episode_hash\n"
+        "print(episode_hash(gymnasium.make(sys.argv[2]), 7))"
+    )
+    run = [sys.executable, "-c", code, __file__.rsplit("/", 1)[0], env.spec.id]
+    done = subprocess.run(run, capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": "5", "HOME": "/tmp"})
+    assert done.stdout.strip() == episode_hash(env, 7)
+
+
+def test_observations_are_in_the_space_and_never_change_afterwards(env):
+    rng = np.random.default_rng(0)
+    observation, _ = env.reset(seed=0)
+    for _ in range(200):
+        kept = {key: value.copy() for key, value in observation.items()}
+        following, reward, *_ = env.step(rng.uniform(-1, 1, env.action_space.shape))
+        for key, value in observation.items():
+            np.testing.assert_array_equal(value, kept[key])
+            assert value.dtype == np.float64
+        assert env.observation_space.contains(following)
+        assert isinstance(reward, float)
+        observation = following
+
+
+def test_starts_differ_in_every_entry_that_a_start_may_change(env):
+    starts = [env.reset(seed=seed)[0] for seed in range(3)]
+    for key in ("joint_positions", "tcp_pose", "object_pose", "goal_pose"):
+        assert np.ptp([start[key] for start in starts], axis=0).max() > 1e-3, key
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_actions_beyond_the_bounds_are_the_bounds(mode):
+    env = gym.make("onedemo/Stack-v0", control_mode=mode).unwrapped
+    outcomes = []
+    for action in (np.full(env.action_space.shape, 7.0), np.ones(env.action_space.shape)):
+        env.reset(seed=1)
+        outcomes.append(env.step(action)[0]["joint_positions"])
+    np.testing.assert_array_equal(*outcomes)
+
+
+@pytest.mark.parametrize(
+    "spoil, message",
+    [
+        (lambda a: a[:-1], r"action: has shape \(7,\); expected \(8,\)"),
+        (lambda a: np.append(a, 0), r"action: has shape \(9,\)"),
+        (lambda a: a[None], r"action: has shape \(1, 8\)"),
+        (lambda a: np.where(np.arange(8) == 3, np.nan, a), "action: entry 3 is not finite"),
+        (lambda a: np.where(np.arange(8) == 5, -np.inf, a), "action: entry 5 is not finite"),
+    ],
+)
+def test_bad_actions_are_refused_and_change_nothing(spoil, message):
+    env = gym.make("onedemo/Stack-v0").unwrapped
+    env.reset(seed=0)
+    before = env.sim.data.time
+    with pytest.raises(BadAction, match=message):
+        env.step(spoil(np.zeros(8)))
+    assert env.sim.data.time == before
+
+
+@each_id
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"robot": "R2D2"}, "unknown robot 'R2D2'; known: Panda"),
+        ({"level": "L9"}, "unknown level 'L9'; known: L0, L1, L2"),
+        ({"level": 1}, "unknown level 1; known: L0"),
+        ({"control_mode": "torque"}, "unknown control_mode 'torque'; known: joint_velocity, ee_twist"),
+        ({"reward": "huge"}, "unknown reward 'huge'; known: sparse, dense"),
+        ({"control_frequency": 60}, "control_frequency': 60 Hz does not divide 500 Hz; allowed: 10, 20, 25"),
+        ({"control_frequency": 0}, "0 is not a positive whole number"),
+        ({"control_frequency": 50.0}, "50.0 is not a positive whole number"),
+    ],
+)
+def test_bad_options_are_named_with_what_is_allowed(name, options, message):
+    with pytest.raises(OneDemoError, match=message):
+        gym.make(name, **options)
+
+
+def test_a_typing_error_in_the_id_is_gymnasiums_own_error():
+    with pytest.raises(gym.error.NameNotFound, match="Stack"):
+        gym.make("onedemo/Stac-v0")
+
+
+def test_an_id_can_be_made_by_its_module():
+    assert gym.make("onedemo.envs:onedemo/Stack-v0").spec.id == "onedemo/Stack-v0"
+
+
+def test_importing_registers_without_a_simulator():
+    code = "import sys, onedemo.envs; print({'mujoco', 'robosuite'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
+def test_without_a_drawing_library_everything_but_pictures_works(monkeypatch):
+    monkeypatch.setattr("onedemo.envs.render._backends", lambda: [])
+    env = gym.make("onedemo/Stack-v0", render_mode="rgb_array")
+    env.reset(seed=0)
+    env.step(np.zeros(8))
+    with pytest.raises(RenderingUnavailable, match=r"no OpenGL library found.*apt install libegl1") as caught:
+        env.render()
+    assert "\n" not in str(caught.value)
+
+
+def test_pictures_show_something_and_leave_the_physics_alone():
+    plain, drawn = (gym.make("onedemo/Stack-v0", render_mode=mode) for mode in (None, "rgb_array"))
+    for each in (plain, drawn):
+        each.reset(seed=3)
+    for _ in range(3):
+        try:
+            picture = drawn.render()
+        except RenderingUnavailable as error:
+            pytest.skip(str(error))
+        assert (picture.shape, picture.dtype) == ((480, 640, 3), np.uint8)
+        assert picture.std() > 10
+        one, other = (each.step(np.ones(8))[0] for each in (plain, drawn))
+        np.testing.assert_array_equal(one["joint_positions"], other["joint_positions"])
+    drawn.close()
+    with pytest.raises(OneDemoError, match="unknown render_mode"):
+        gym.make("onedemo/Stack-v0", render_mode="ascii")
+
+
+def test_wrappers_of_gymnasium_work():
+    flat = gym.wrappers.FlattenObservation(gym.make("onedemo/Stack-v0"))
+    observation, _ = flat.reset(seed=0)
+    assert flat.observation_space.contains(observation)
+    short = gym.make("onedemo/Stack-v0", max_episode_steps=3)
+    short.reset(seed=0)
+    assert [short.step(np.zeros(8))[3] for _ in range(3)] == [False, False, True]
+
+
+def test_vector_environments_work_in_processes():
+    async_envs = gym.make_vec("onedemo/Stack-v0", num_envs=2, vectorization_mode="async")
+    sync_envs = gym.make_vec("onedemo/Stack-v0", num_envs=2, vectorization_mode="sync")
+    try:
+        for envs in (async_envs, sync_envs):
+            envs.reset(seed=4)
+        one, other = (envs.step(np.full((2, 8), 0.3))[0] for envs in (async_envs, sync_envs))
+        for key in one:
+            np.testing.assert_array_equal(one[key], other[key])
+    finally:
+        async_envs.close()
+        sync_envs.close()
+
+
+def test_memory_stays_flat_over_resets(env):
+    def resident():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * 4096 / 2**20
+
+    for _ in range(50):
+        env.reset()
+    before = resident()
+    for _ in range(500):
+        env.reset()
+        env.step(np.zeros(env.action_space.shape))
+    assert resident() - before < 2.0

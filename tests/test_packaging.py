@@ -1,0 +1,71 @@
+"""What is installed is what was meant."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    tomllib = pytest.importorskip("tomli")
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def test_every_folder_of_code_is_a_listed_package():
+    folders = {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    listed = set(PROJECT["tool"]["setuptools"]["packages"])
+    assert listed == {f"onedemo.{folder}" for folder in folders}
+    assert PROJECT["tool"]["setuptools"]["package-dir"] == {f"onedemo.{folder}": folder for folder in folders}
+    assert not (ROOT / "__init__.py").exists()
+    assert not list((ROOT / "tests").glob("**/__init__.py"))
+
+
+def test_every_package_says_that_it_is_typed():
+    for path in ROOT.glob("*/__init__.py"):
+        assert (path.parent / "py.typed").exists(), path.parent.name
+
+
+def test_the_wheel_holds_code_configs_demonstrations_and_licences(tmp_path):
+    source = tmp_path / "source"  # a build leaves files behind that would end up in later wheels
+    for item in ("pyproject.toml", "README.md", "LICENSE", "planner", "envs", "baselines", "configs", "bench"):
+        copy = shutil.copytree if (ROOT / item).is_dir() else shutil.copy
+        source.mkdir(exist_ok=True)
+        copy(ROOT / item, source / item)
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path), str(source)]
+    done = subprocess.run(build, capture_output=True, text=True)
+    if "No module named build" in done.stderr:
+        pytest.skip("needs the package build")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    sources = {
+        f"onedemo/{path.relative_to(ROOT)}"
+        for folder in ("planner", "envs", "baselines", "configs", "bench")
+        for path in (ROOT / folder).glob("**/*")
+        if path.suffix in (".py", ".yaml", ".npz", ".typed") or path.name.startswith("LICENSE")
+    }
+    assert sources <= names
+    assert not [name for name in names if name.startswith(("tests", "onedemo/tests"))]
+
+
+def test_torch_is_nowhere_in_the_core():
+    assert not [need for need in PROJECT["project"]["dependencies"] if "torch" in need or "stable" in need]
+
+
+def test_constraints_name_versions_and_no_hosts():
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pinned = [line for line in lines if line and not line.startswith("#")]
+    assert len(pinned) > 30
+    assert all("==" in line and "://" not in line for line in pinned)
+
+
+def test_the_changelog_speaks_of_what_comes():
+    assert "## [Unreleased]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
