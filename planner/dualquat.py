@@ -161,6 +161,10 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
     if worst is not None and abs(norms.flat[worst] - 1.0) > UNIT_TOLERANCE:
         raise NotUnit(name, float(norms.flat[worst]))
     slant = np.abs(np.sum(array[..., :4] * array[..., 4:], axis=-1))
+    if slant.size and slant.max() > UNIT_TOLERANCE * (1.0 + np.abs(array[..., 4:]).max()):
+        raise NotUnit(
+            f"{name}, whose dual part is not orthogonal to its primary part,", float(np.sqrt(1 + slant.max()))
+        )
     off = (np.abs(norms - 1.0) > ON_MANIFOLD) | (slant > ON_MANIFOLD)
     return np.where(off[..., None], normalized(array), array) if off.any() else array
 

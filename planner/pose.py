@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import dualquat as dq
-from .errors import BadShape, NotUnit
+from .errors import BadShape, NotFinite, NotUnit
+
+METERS_PER_RADIAN = 0.2
+"""Lever [m] that turns an angle into a screw length."""
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:
@@ -64,6 +67,11 @@ class Pose:
         array = np.asarray(matrix, dtype=np.float64)
         if array.shape != (4, 4):
             raise BadShape("matrix", array.shape, "(4, 4)")
+        if not np.isfinite(array).all():
+            raise NotFinite("matrix", tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0]))
+        turn = array[:3, :3]
+        if np.abs(turn @ turn.T - np.eye(3)).max() > dq.UNIT_TOLERANCE or np.linalg.det(turn) < 0:
+            raise NotUnit("rotation part of the matrix", float(np.linalg.norm(turn, axis=1).max()))
         xyzw = Rotation.from_matrix(array[:3, :3]).as_quat()
         return Pose.from_position_quaternion(array[:3, 3], xyzw[[3, 0, 1, 2]])
 
@@ -110,13 +118,13 @@ class Pose:
     def yaw(self) -> float:
         """Turn about z [rad] in (-pi, pi] of the twist-swing split: the tilt is left out."""
         w, _, _, z = self.dq[:4]
-        return float(np.angle(np.exp(2j * np.arctan2(z, w))))
+        return float(np.pi - (np.pi - 2.0 * np.arctan2(z, w)) % (2.0 * np.pi))
 
     @property
     def tilt(self) -> float:
         """Angle [rad] between the frame's z axis and the vertical."""
-        _, x, y, _ = self.dq[:4]
-        return float(2 * np.arcsin(min(1.0, np.hypot(x, y))))
+        w, x, y, z = self.dq[:4]
+        return float(2.0 * np.arctan2(np.hypot(x, y), np.hypot(w, z)))
 
     def __repr__(self) -> str:
         """Position and quaternion, rounded."""
@@ -213,10 +221,10 @@ class PosePath:
     def joined(self, other: PosePath) -> PosePath:
         """This path, then another; a first pose equal to our last one is not repeated."""
         distance, angle = self[-1].gap(other[0])
-        start = 1 if distance < 1e-9 and angle < 1e-9 and len(other) > 1 else 0
+        start = 1 if distance < 1e-9 and angle < 1e-9 else 0
         return PosePath(np.concatenate([self.dqs, other.dqs[start:]]))
 
-    def lengths(self, meters_per_radian: float = 0.2) -> np.ndarray:
+    def lengths(self, meters_per_radian: float = METERS_PER_RADIAN) -> np.ndarray:
         """(n,) screw length [m] from the start: steps of `sqrt(|dp|^2 + (l theta)^2)`.
 
         Paper: "length" without a metric; this one is left-invariant, and depends on the body origin.

@@ -20,10 +20,9 @@ from .arm import Arm
 from .controller import ControllerSettings, choose_sign, joint_velocity
 from .errors import BadOption
 from .jit import kernel
-from .pose import PosePath
+from .pose import METERS_PER_RADIAN, PosePath
 from .workspace import LIMITS, PURSUIT, bound, pose_and_jacobian
 
-METERS_PER_RADIAN = 0.2
 PROGRESS = 1e-4
 """Screw length [m] that counts as progress."""
 FOLLOWING, ARRIVED, STALLED = 0, 1, 2

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import dualquat as dq
 from .errors import BadOption, PlanFailed
-from .pose import Pose, PosePath
+from .pose import METERS_PER_RADIAN, Pose, PosePath
 
 GUIDE_START = 0.2
 """Fraction of the imitated path where blending ends; the value of the paper's experiments."""
@@ -61,7 +61,8 @@ def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "len
 
 def screw_path(start: Pose, end: Pose, step: float) -> PosePath:
     """Poses along the screw from start to end, both included, at most `step` [m] of screw length apart."""
-    length = PosePath(np.stack([start.dq, end.dq])).lengths()[-1]
+    twist = dq.twist_from_dq(dq.mul(dq.conj(start.dq), end.dq))
+    length = math.hypot(np.linalg.norm(twist[:3]), METERS_PER_RADIAN * np.linalg.norm(twist[3:]))
     tau = np.linspace(0.0, 1.0, max(1, math.ceil(length / step)) + 1)
     poses = dq.sclerp(start.dq, end.dq, tau)
     poses[0], poses[-1] = start.dq, end.dq
@@ -108,7 +109,9 @@ def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
     to_goal = imitated_path(demonstrated, goal)
     lengths = demonstrated.lengths()
     s = lengths / lengths[-1] if lengths[-1] > 0 else np.linspace(0.0, 1.0, len(demonstrated))
-    return PosePath(dq.sclerp(from_start.dqs, to_goal.dqs, s * s * (3.0 - 2.0 * s)))
+    # one way round for the whole path: the scalar part between the two is the same at every pose
+    way = 1.0 if dq.mul(dq.conj(from_start.dqs[0]), to_goal.dqs[0])[0] >= 0.0 else -1.0
+    return PosePath(dq.sclerp(from_start.dqs, way * to_goal.dqs, s * s * (3.0 - 2.0 * s), shortest=False))
 
 
 def reachable_guide(
