@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from . import demo_commands
-from .console import console
+from .console import console, labeled
 
 USAGE_ERROR = 2
 app = typer.Typer(
@@ -79,11 +79,5 @@ def main() -> None:
     try:
         app(prog_name="onedemo")
     except OneDemoError as error:
-        console(stderr=True).print(f"[red]error[/red]  {_plain(str(error))}", soft_wrap=True)
+        console(stderr=True).print(labeled("error", "red", str(error)))
         sys.exit(USAGE_ERROR)
-
-
-def _plain(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)

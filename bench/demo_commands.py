@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import console
+from .console import console, labeled
 
 if TYPE_CHECKING:
     from ..planner.demo import Demonstration, Segment
@@ -34,8 +34,8 @@ def check(
     path = demonstration_path(file)
     demo = load_demonstration(path)
     out = console()
-    out.print(f"[bold]{demo.name}[/bold]  {demo.source} {demo.robot}, task {demo.task or '-'}")
-    out.print(f"  file      {path}", soft_wrap=True)
+    out.print(labeled(demo.name, "bold", f"{demo.source} {demo.robot}, task {demo.task or '-'}"))
+    out.print(f"  file      {path}")
     out.print(f"  length    {demo.duration:.2f} s, {len(demo.path)} samples, {demo.path.lengths()[-1]:.2f} m (screw)")
     out.print(f"  tool      {demo.tcp_frame}, units {UNITS}")
     out.print(f"  joints    {'recorded' if demo.joint_positions is not None else 'not recorded'}")
@@ -44,11 +44,12 @@ def check(
         out.print("segments, each with the screw from its first to its last pose in the world:")
     for segment in demo.segments:
         what, screw = _segment_lines(demo, segment)
-        out.print(f"  [bold]{segment.name}[/bold]", f"    {what}", f"    {screw}", sep="\n", soft_wrap=True)
+        out.print(f"  {segment.name}", style="bold")
+        out.print(f"    {what}\n    {screw}")
     warnings = warnings_of(demo)
     for warning in warnings:
-        out.print(f"[yellow]warning[/yellow]  {warning}", soft_wrap=True)
-    out.print("[green]ok[/green]" if not warnings else f"[green]ok[/green], with {len(warnings)} warnings")
+        out.print(labeled("warning", "yellow", warning))
+    out.print(labeled("ok", "green", f"with {len(warnings)} warnings" if warnings else ""))
 
 
 @app.command("import")
@@ -94,7 +95,7 @@ def import_(
             licence=licence,
         )
     save_demonstration(demo, output)
-    console().print(f"wrote {output}: {len(demo.path)} samples, {len(demo.segments)} segments", soft_wrap=True)
+    console().print(f"wrote {output}: {len(demo.path)} samples, {len(demo.segments)} segments")
 
 
 def demonstration_path(name: str) -> Path:

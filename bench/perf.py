@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from .console import console
+from .console import console, labeled
 
 BATCHES = 15
 BATCH_SECONDS = 0.02
@@ -243,10 +243,10 @@ def run_perf(pattern: str, json_file: Path | None) -> int:
             rows.append(line)
             value = "-" if line.value is None else f"{line.value:.3g} {line.unit}"
             goal = "" if line.goal is None else f"(goal {line.goal:.3g})"
-            verdict = {True: "[green]ok[/green]    ", False: "[red]missed[/red]", None: "-     "}[line.ok]
-            out.print(f"{verdict}  {line.name}: [bold]{value}[/bold] {goal}", soft_wrap=True)
+            word, style = {True: ("ok    ", "green"), False: ("missed", "red"), None: ("-     ", "")}[line.ok]
+            out.print(labeled(word, style, f"{line.name}: {value} {goal}"))
             if line.note:
-                out.print(f"        {line.note}", soft_wrap=True, markup=False, style="dim")
+                out.print(f"        {line.note}", style="dim")
     if json_file is not None:
         write_json(rows, json_file)
     return 1 if any(line.ok is False for line in rows) else 0

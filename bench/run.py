@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..configs.schema import RunConfig, load_config
 from ..configs.shipped import shipped_config
 from ..planner.errors import BadConfig
-from .console import console
+from .console import console, labeled
 from .demo_commands import demonstration_path
 from .records import FILE, EpisodeRecord, RecordWriter, locked, read_records
 from .scenarios import scenarios_of
@@ -39,19 +39,17 @@ def run_config(config: str, overrides: list[str], output: Path, *, quiet: bool =
         with locked(folder):
             lines = _run(settings, source, folder, " ".join(["onedemo run", config, *overrides]), err)
     except KeyboardInterrupt:
-        err.print(f"stopped; finished episodes are kept in {folder}, running the same again goes on", soft_wrap=True)
+        err.print(f"stopped; finished episodes are kept in {folder}, running the same again goes on")
         return INTERRUPTED
     except OSError as error:
         reason = error.strerror or type(error).__name__
-        console(stderr=True).print(
-            f"[red]error[/red]  {folder}: {reason}; finished episodes are kept, running the same again goes on",
-            soft_wrap=True,
-        )
+        text = f"{folder}: {reason}; finished episodes are kept, running the same again goes on"
+        console(stderr=True).print(labeled("error", "red", text))
         return DISK_FULL
     out = console(quiet=quiet)
     for line in lines:
-        out.print(line, soft_wrap=True)
-    console().print(str(folder), soft_wrap=True, markup=False)
+        out.print(line)
+    console().print(str(folder))
     return 0
 
 
@@ -142,7 +140,7 @@ def _episodes(env: Any, policy: Policy, config: RunConfig, folder: Path, err: An
     file = folder / FILE
     known, foreign = read_records(file)
     for number in foreign:
-        err.print(f"[yellow]warning[/yellow]  {file}, line {number}: not an episode record, skipped", soft_wrap=True)
+        err.print(labeled("warning", "yellow", f"{file}, line {number}: not an episode record, skipped"))
     records = {record.index: record for record in known if record.index < config.episodes}
     todo = [scenario for scenario in scenarios_of(config) if scenario.index not in records]
     if records:

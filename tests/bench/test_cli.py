@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -14,6 +15,8 @@ import pytest
 
 from onedemo.bench.cli import main
 from onedemo.bench.records import read_records
+from onedemo.configs.shipped import shipped_demonstration
+from onedemo.planner.demo_io import load_demonstration, save_demonstration
 
 ENTRY = "import sys; from onedemo.bench.cli import main; main()"
 
@@ -52,6 +55,15 @@ def test_a_demonstration_is_summed_up_for_a_reader(monkeypatch, capsys):
     assert code == 0
     for word in ("26.55 s", "approach", "transfer", "screw:", "units", "teleoperated", "MIT", "warning"):
         assert word in out
+
+
+def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_path):
+    demo = load_demonstration(shipped_demonstration("stack"))
+    save_demonstration(dataclasses.replace(demo, name="[/red] [bold]x", licence="[link=x]y"), tmp_path / "odd.npz")
+    code, out, _ = called(monkeypatch, capsys, "demo", "check", tmp_path / "odd.npz")
+    assert code == 0
+    assert "[/red] [bold]x" in out
+    assert "[link=x]y" in out
 
 
 @pytest.mark.parametrize(
