@@ -74,6 +74,27 @@ def test_ideal_tracking_is_the_recurrence_of_screw_steps(tau):
         q = q + DT * qdot
 
 
+def test_the_reference_is_the_first_pose_beyond_the_capture_radius():
+    arm, path = a_path(8)
+    settings_ = PursuitSettings(capture_radius=0.012)
+    pursuit, q, seen = Pursuit(arm, path, DT, settings=settings_), READY.copy(), set()
+    while True:
+        x = arm.fk(q).dq
+        status, qdot = pursuit.step(q)
+        distance, angle = dq.gap(x, path.dqs)
+        screw_length = np.hypot(distance, 0.2 * angle)
+        if pursuit.index < len(path) - 1:
+            assert screw_length[pursuit.index] > 0.012
+        if pursuit.index > 0:
+            seen.add(pursuit.index)
+            assert screw_length[pursuit.index - 1] <= 0.012 or pursuit.index - 1 in seen
+        if status != FOLLOWING:
+            break
+        q = q + DT * qdot
+    assert status == ARRIVED
+    assert len(seen) > 5
+
+
 def test_the_reference_never_goes_back_and_stays_at_the_end():
     arm, path = a_path(4)
     pursuit, q, indices = Pursuit(arm, path, DT), READY.copy(), []
