@@ -7,6 +7,7 @@ import copy
 import mujoco
 import numpy as np
 
+from ..planner.chain import FRAME
 from .boxes import Box
 from .scene import ARM, FINGERS, ArmIndex, compiled_scene
 from .state import State, read_arm, read_objects
@@ -37,7 +38,7 @@ class Simulation:
         self._read_index = [np.array([*arm.qpos, *arm.qvel, arm.site, *arm.pads]) for arm in arms]
         self._home_side = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
         self._arm_views = (data.qpos, data.qvel, data.site_xmat, data.geom_xpos)
-        self._frames = np.empty((arms[0].arm.dof, 6))
+        self._frames = np.empty((arms[0].arm.dof, FRAME))
         self._object_places = model.jnt_qposadr[model.body_jntadr[self.scene.objects]]
         self._object_dofs = model.body_dofadr[self.scene.objects]
 

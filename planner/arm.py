@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chain import forward_into, forward_jacobian_into
+from .chain import FRAME, forward_into, forward_jacobian_into
 from .errors import BadModel, BadShape, NotFinite
 from .models import ChainData, chain_from_mujoco, chain_from_urdf
 from .pose import Pose
@@ -78,7 +78,7 @@ class Arm:
     def fk(self, q: ArrayLike) -> Pose:
         """Pose of the tcp in the world at joint positions q (dof,)."""
         out = np.empty(8)
-        forward_into(self.chain, self._checked(q), np.empty((self.dof, 6)), out)
+        forward_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), out)
         return Pose(out)
 
     def jacobian(self, q: ArrayLike) -> np.ndarray:
@@ -88,7 +88,7 @@ class Arm:
     def fk_jacobian(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Dual quaternion (8,) of the tcp and body Jacobian (6, dof) in one pass."""
         x, jacobian = np.empty(8), np.empty((6, self.dof))
-        forward_jacobian_into(self.chain, self._checked(q), np.empty((self.dof, 6)), jacobian, x)
+        forward_jacobian_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), jacobian, x)
         return x, jacobian
 
     def margin(self, q: ArrayLike) -> float:
@@ -96,7 +96,8 @@ class Arm:
         q = np.asarray(q, dtype=np.float64)
         return float(np.minimum(q - self.lower, self.upper - q).min())
 
-    def _checked(self, q: ArrayLike) -> np.ndarray:
+    def checked(self, q: ArrayLike) -> np.ndarray:
+        """Joint positions (dof,) as float64, if they have that shape and are finite."""
         q = np.asarray(q, dtype=np.float64)
         if q.shape != (self.dof,):
             raise BadShape(f"{self.name}: q", q.shape, f"({self.dof},)")

@@ -13,11 +13,16 @@ from . import screw
 from .jit import kernel
 
 REVOLUTE, PRISMATIC = 0.0, 1.0
+FRAME = 10
+"""Numbers that `forward` leaves behind per joint."""
 
 
 @kernel
 def forward(chain, q, frames):
-    """Pose of the tcp as a tuple; axis (0..2) and origin (3..5) of each joint into `frames` (dof, 6)."""
+    """Pose of the tcp as a tuple; each joint's axis (0..2), origin (3..5) and turn (6..9) into `frames` (dof, 10).
+
+    Origin and turn are those of the frame that has moved with the joint: the pose of its link.
+    """
     r = (1.0, 0.0, 0.0, 0.0)
     p = (0.0, 0.0, 0.0)
     n = len(chain) - 1
@@ -28,14 +33,16 @@ def forward(chain, q, frames):
         if i < n:
             w, x, y, z = r
             axis = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z)
-            for k in range(3):
-                frames[i, k] = axis[k]
-                frames[i, 3 + k] = p[k]
             if chain[i, 7] == 0.0:
                 s, c = math.sin(0.5 * q[i]), math.cos(0.5 * q[i])
                 r = (w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s)
             else:
                 p = (p[0] + q[i] * axis[0], p[1] + q[i] * axis[1], p[2] + q[i] * axis[2])
+            for k in range(3):
+                frames[i, k] = axis[k]
+                frames[i, 3 + k] = p[k]
+            for k in range(4):
+                frames[i, 6 + k] = r[k]
     return screw.from_pose(p, r)
 
 

@@ -64,6 +64,14 @@ class BadModel(OneDemoError, ValueError):
         super().__init__(f"{source}: {what}: {reason}")
 
 
+class UnfitShape(OneDemoError, ValueError):
+    """A shape or an obstacle has a size, a vertex or a margin that cannot be used."""
+
+    def __init__(self, shape: str, key: str, reason: str):
+        self.shape, self.key, self.reason = shape, key, reason
+        super().__init__(f"{shape}: {key}: {reason}")
+
+
 class UnknownName(OneDemoError, ValueError):
     """A name (robot, level, option, policy, task) that is not among the known ones."""
 

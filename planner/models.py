@@ -47,7 +47,7 @@ class _ChainBuilder:
 
     def add_joint(self, axis: ArrayLike, position: ArrayLike, kind: float, rest: float) -> None:
         """Append a joint along `axis` through `position`; at q = rest it displaces nothing."""
-        turn = _turn_z_to(np.asarray(axis, dtype=np.float64))
+        turn = turn_z_to(np.asarray(axis, dtype=np.float64))
         body_from_joint = Pose.from_position_quaternion(position, turn)
         back = Pose.from_yaw([0, 0, 0], -rest)
         if kind == PRISMATIC:
@@ -63,7 +63,7 @@ class _ChainBuilder:
         return np.concatenate([pose.quaternion, pose.position, [kind]])
 
 
-def _turn_z_to(axis: np.ndarray) -> np.ndarray:
+def turn_z_to(axis: np.ndarray) -> np.ndarray:
     """Quaternion that turns z to a direction by the smallest angle."""
     axis = axis / np.linalg.norm(axis)
     if axis[2] < -1.0 + 1e-12:
@@ -78,11 +78,11 @@ def chain_from_mujoco(model: Any, joint_names: Sequence[str], site: str, source:
     Raises:
         BadModel: the joints are not exactly the moving joints between the world and the site.
     """
-    site_id = _mujoco_id(model, "site", site, source)
-    wanted = [_mujoco_id(model, "joint", joint, source) for joint in joint_names]
+    site_id = mujoco_id(model, "site", site, source)
+    wanted = [mujoco_id(model, "joint", joint, source) for joint in joint_names]
     builder, found = _ChainBuilder(), []
-    for body in _mujoco_bodies(model, int(model.site_bodyid[site_id])):
-        builder.move(_mujoco_pose(model.body_pos[body], model.body_quat[body]))
+    for body in mujoco_bodies(model, int(model.site_bodyid[site_id])):
+        builder.move(mujoco_pose(model.body_pos[body], model.body_quat[body]))
         first = int(model.body_jntadr[body])
         for joint in range(first, first + int(model.body_jntnum[body])):
             # mjJNT_SLIDE and mjJNT_HINGE
@@ -95,7 +95,7 @@ def chain_from_mujoco(model: Any, joint_names: Sequence[str], site: str, source:
     if found != wanted:
         known = ", ".join(model.joint(joint).name for joint in found)
         raise BadModel(source, "joint names", f"the joints from the world to {site!r} are: {known}")
-    builder.move(_mujoco_pose(model.site_pos[site_id], model.site_quat[site_id]))
+    builder.move(mujoco_pose(model.site_pos[site_id], model.site_quat[site_id]))
     limited = model.jnt_limited[wanted].astype(bool)
     lower, upper = model.jnt_range[wanted].T
     return ChainData(
@@ -136,7 +136,7 @@ def chain_from_urdf(path: str | Path, tcp_frame: str, world_from_base: Pose | No
     builder.move(world_from_base or Pose.identity())
     for joint in joints:
         builder.move(Pose.from_matrix(model.jointPlacements[joint].homogeneous))
-        builder.add_joint(*_pinocchio_axis(model, joint, source), 0.0)
+        builder.add_joint(*pinocchio_axis(model, joint, source), 0.0)
     builder.move(Pose.from_matrix(frame.placement.homogeneous))
     index_q = [model.joints[joint].idx_q for joint in joints]
     index_v = [model.joints[joint].idx_v for joint in joints]
@@ -158,18 +158,21 @@ def _check_placement(source: Path, name: str, matrix: np.ndarray) -> None:
         raise BadModel(source, name, "its orientation is not a rotation")
 
 
-def _mujoco_pose(position: np.ndarray, wxyz: np.ndarray) -> Pose:
+def mujoco_pose(position: np.ndarray, wxyz: np.ndarray) -> Pose:
+    """Pose of a position (3,) [m] and a quaternion (4,) as MuJoCo keeps them, normalized."""
     return Pose.from_position_quaternion(position, wxyz / np.linalg.norm(wxyz))
 
 
-def _mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
+def mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
+    """Index of a named thing ("joint", "site" …) of a compiled model."""
     try:
         return int(getattr(model, kind)(name).id)
     except KeyError:
         raise BadModel(source, f"{kind} {name!r}", "not in the model") from None
 
 
-def _mujoco_bodies(model: Any, body: int) -> list[int]:
+def mujoco_bodies(model: Any, body: int) -> list[int]:
+    """The bodies from the world (excluded) to a body (included)."""
     path = []
     while body != 0:
         path.append(body)
@@ -187,14 +190,15 @@ def _pinocchio_joints(model: Any, frame: Any) -> list[int]:
     return path[::-1]
 
 
-def _pinocchio_axis(model: Any, joint: int, source: Path) -> tuple[np.ndarray, np.ndarray, float]:
+def pinocchio_axis(model: Any, joint: int, source: Path) -> tuple[np.ndarray, np.ndarray, float]:
     """Axis, position and kind of a joint, from its own column of the Jacobian in its own frame."""
     import pinocchio as pin
 
     if model.joints[joint].nv != 1:
         raise BadModel(source, f"joint {model.names[joint]!r}", "neither turns nor slides")
     jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-    column = jacobian[:, model.joints[joint].idx_v]
+    # a model of one joint gives a vector
+    column = jacobian.reshape(6, -1)[:, model.joints[joint].idx_v]
     if not abs(np.linalg.norm(column) - 1.0) < 1e-6:
         raise BadModel(source, f"joint {model.names[joint]!r}", "its axis is not a direction")
     if np.linalg.norm(column[3:]) > 0.5:

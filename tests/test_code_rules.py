@@ -26,19 +26,53 @@ PLANNER_ORDER = [
     "linear",
     "dualquat",
     "pose",
+    "shapes",
+    "hulls",
+    "cover",
     "chain",
     "models",
     "arm",
+    "body",
+    "links",
+    "body_models",
     "workspace",
     "controller",
     "pursuit",
     "ik",
     "tsia",
+    "bimanual",
+    "smooth",
+    "timing",
     "motions",
+    "gjk",
+    "proximity",
+    "qp",
+    "robot_work",
+    "clearance",
+    "barrier",
+    "safety",
+    "guarded",
+    "tangent",
+    "edges",
+    "escape_tree",
+    "escape",
+    "repet",
+    "scene_work",
+    "joint_search",
+    "joint_leg",
+    "leg",
+    "planning",
     "segment",
     "demo",
     "demo_io",
     "recordings",
+    "strict_json",
+    "log_parts",
+    "motion_log",
+    "judge_geometry",
+    "judge_deviation",
+    "judge_sweep",
+    "certify",
 ]
 ENVS_ORDER = [
     "task",
@@ -59,7 +93,8 @@ ENVS_ORDER = [
     "__init__",
 ]
 SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
-ONE_FILE = {"robosuite": {"envs/table_model.py", "bench/perf.py"}, "pinocchio": {"planner/models.py", "bench/perf.py"}}
+READERS = {"planner/models.py", "planner/body_models.py", "planner/judge_geometry.py"}
+ONE_FILE = {"robosuite": {"envs/table_model.py", "bench/perf.py"}, "pinocchio": {*READERS, "bench/perf.py"}}
 BANNED_CALLS = {"eval", "exec", "compile", "__import__", "breakpoint"}
 BANNED_MODULES = {"pickle", "marshal", "shelve", "dill", "joblib", "random", "requests", "urllib", "socket"}
 
@@ -166,6 +201,16 @@ def test_nothing_loads_code_or_uses_global_randomness(path):
             assert keywords.get("typ") == "'safe'", f"line {node.lineno}: YAML"
         for option in ("parallel", "fastmath"):
             assert option not in keywords, f"line {node.lineno}: {option}"
+
+
+def test_the_judge_shares_no_query_with_the_planner():
+    seen, todo = set(), ["certify"]
+    while todo:
+        stem = todo.pop()
+        if stem not in seen:
+            seen.add(stem)
+            todo += [module for folder, module in imports_of(ROOT / "planner" / f"{stem}.py") if folder == "planner"]
+    assert not seen & {"proximity", "gjk", "clearance", "robot_work", "edges", "safety", "escape", "joint_search"}
 
 
 @each_source

@@ -1,0 +1,288 @@
+"""Compiled growth of an escape tree: poses in planes that touch obstacles, until one sees the way home.
+
+From a root near an obstacle a plane is laid through the tool, perpendicular to the line to the obstacle's closest
+point. Sliding in it cannot bring the tool closer to that obstacle (method reference section 4, supporting-plane
+lemma). The best leaf gets a plane of its own and children in it, unless it sees the way home: a clear screw to a
+pose of the path behind the obstacle. Every edge is proven clear. Paper: section III-C and algorithm 2, whose
+printed form starts again from the root for each leaf and never grows.
+
+A row of the tree: pose (8), parent, level, verdict, length of the way so far [m], score, normal (3), direction u (3) of
+the plane laid at it (v = normal x u), room [m], 1 if it has been expanded.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import screw
+from .clearance import GAP, KEEP, NORMAL, find_near
+from .edges import edge_is_clear, place_tool, screw_is_clear, tool_room
+from .jit import inner, kernel
+from .robot_work import HEADER, N_NEAR, NEAR, WORLD
+from .tangent import SIDES, child_direction, plane_basis
+
+PARENT, LEVEL, VERDICT, LENGTH, SCORE, NORMAL_AT, U_AT, ROOM, EXPANDED, TREE_WIDTH = (
+    8,
+    9,
+    10,
+    11,
+    12,
+    13,
+    16,
+    19,
+    20,
+    21,
+)
+KEPT, REJECTED_EDGE, VISITED, OUTSIDE, GOAL_EDGE = 0, 1, 2, 3, 4
+"""Verdicts on a child: kept; its edge is not clear; a kept one is there already; outside the workspace; it sees the
+path again."""
+CELLS = 8192
+"""Size of the table of visited cells."""
+
+STEP, LEVELS, BEAM, WORLD_BASIS, SQUARE, GOAL_COST, SPREAD, TURN, RANDOM, AWAY, MOST = range(11)
+BIAS, LOWEST, HIGHEST, PULL, CELL, WIDEST, SHELL, ROUNDS, RETRIES, GROW, SHRINK = (
+    11,
+    14,
+    17,
+    20,
+    21,
+    22,
+    23,
+    24,
+    25,
+    26,
+    27,
+)
+ON_SHELL, SPACING, SHORTCUT, CANDIDATES, OPTIONS = 28, 29, 30, 31, 32
+"""Columns of the settings, see `repet.RepetSettings`."""
+
+
+@inner
+def _shifted(x, delta):
+    """The pose moved by a world vector, turned by nothing."""
+    p = screw.translation(x)
+    return screw.from_pose((p[0] + delta[0], p[1] + delta[1], p[2] + delta[2]), (x[0], x[1], x[2], x[3]))
+
+
+@inner
+def _cell(x, size, cells):
+    """Slot of a pose in the table of visited cells: (slot, key)."""
+    p = screw.translation(x)
+    sign = 1.0 if x[0] >= 0.0 else -1.0
+    key = 17.0
+    for value in (p[0] / size, p[1] / size, p[2] / size, sign * x[1] * 5.0, sign * x[2] * 5.0, sign * x[3] * 5.0):
+        key = (key * 31.0 + math.floor(value + 0.5) + 1e6) % 1e9
+    return int(key) % len(cells), key
+
+
+@inner
+def _visited(x, size, cells):
+    """True if a kept pose lies in the same cell; else the cell is marked."""
+    slot, key = _cell(x, size, cells)
+    for _ in range(len(cells)):
+        if cells[slot] == key:
+            return True
+        if cells[slot] < 0.0:
+            cells[slot] = key
+            return False
+        slot = (slot + 1) % len(cells)
+    return True
+
+
+@inner
+def _outside(x, options):
+    p = screw.translation(x)
+    outside = False
+    for k in range(3):
+        outside |= p[k] < options[LOWEST + k] or p[k] > options[HIGHEST + k]
+    return outside
+
+
+@kernel
+def lay_plane(g, tree, row, towards, options, step):
+    """Find the obstacle closest to a node and lay the plane through it; the tool is left at WORLD, near pairs found."""
+    x = screw.load8(tree, row)
+    place_tool(g, x, WORLD)
+    least, normal = math.inf, (0.0, 0.0, 1.0)
+    for widening in (1.0, 4.0, 1e6):
+        find_near(g, 2.0 * widening * step + options[WIDEST])
+        first = int(g[HEADER, NEAR])
+        for k in range(first, first + int(g[HEADER, N_NEAR])):
+            if g[k, GAP] - g[k, KEEP] < least:
+                least = g[k, GAP] - g[k, KEEP]
+                normal = (g[k, NORMAL], g[k, NORMAL + 1], g[k, NORMAL + 2])
+        if least < math.inf:
+            break
+    u, v = plane_basis(normal, towards, options[WORLD_BASIS])
+    for k in range(3):
+        tree[row, NORMAL_AT + k], tree[row, U_AT + k] = normal[k], u[k]
+    tree[row, ROOM], tree[row, EXPANDED] = least, 1.0
+    return normal, u, v
+
+
+@inner
+def _score(x, length, goal, options):
+    """Cost of a node: way so far plus way home (the paper: only the latter), and what the bias asks for."""
+    p, q = screw.translation(x), screw.translation(goal)
+    home, angle = screw.gap(x, goal)
+    cost = math.hypot(home, 0.2 * angle) + (0.0 if options[GOAL_COST] == 1.0 else length)
+    for k in range(3):
+        cost -= options[BIAS + k] * (p[k] - q[k])
+    return cost
+
+
+@inner
+def _add_node(tree, row, x, parent, verdict, length, score):
+    screw.store8(tree, row, x)
+    tree[row, PARENT], tree[row, VERDICT] = parent, verdict
+    tree[row, LEVEL] = tree[parent, LEVEL] + 1.0 if parent >= 0 else 0.0
+    tree[row, LENGTH], tree[row, SCORE] = length, score
+    for k in range(NORMAL_AT, TREE_WIDTH):
+        tree[row, k] = 0.0
+
+
+@inner
+def _turned(x, axis, angle):
+    """The pose turned about its own origin by an angle about a world axis."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    r = screw.qmul((c, s * axis[0], s * axis[1], s * axis[2]), (x[0], x[1], x[2], x[3]))
+    return screw.from_pose(screw.translation(x), r)
+
+
+@inner
+def _child(k, x, normal, u, v, goal, options, step, state):
+    """Pose of child k of a node: moved in the plane, or turned about one of the plane's axes."""
+    moves = SIDES + int(options[RANDOM])
+    if k >= moves:
+        axis = (normal, u, v)[(k - moves) // 2]
+        return _turned(x, axis, options[TURN] if k % 2 == 0 else -options[TURN])
+    d = child_direction(k, normal, u, v, options[SQUARE], options[AWAY], state)
+    y = _shifted(x, (step * d[0], step * d[1], step * d[2]))
+    if options[SPREAD] == 1.0:
+        # the orientation on the screw home, in proportion to the way made
+        home = screw.gap(x, goal)[0]
+        part = screw.sclerp(x, goal, min(1.0, step / max(home + step, 1e-9)))
+        y = screw.from_pose(screw.translation(y), (part[0], part[1], part[2], part[3]))
+    return y
+
+
+@inner
+def _pulled(g, x, y, normal, options):
+    """The child y brought back towards the obstacle of its parent's plane, to the shell."""
+    excess = tool_room(g, y, 10.0) - (options[SHELL] - options[WIDEST])
+    if excess <= 0.0:
+        return y
+    back = min(excess, 0.5 * screw.gap(x, y)[0])
+    return _shifted(y, (-back * normal[0], -back * normal[1], -back * normal[2]))
+
+
+@kernel
+def expand(g, tree, row, count, goal, cells, options, step, state):
+    """Give a node its children; returns the new number of rows of the tree."""
+    x, towards = screw.load8(tree, row), screw.translation(goal)
+    p = screw.translation(x)
+    normal, u, v = lay_plane(g, tree, row, (towards[0] - p[0], towards[1] - p[1], towards[2] - p[2]), options, step)
+    turns = 6 if options[TURN] > 0.0 else 0
+    for k in range(SIDES + int(options[RANDOM]) + turns):
+        if count >= len(tree):
+            return count
+        y = _child(k, x, normal, u, v, goal, options, step, state)
+        if options[PULL] == 1.0 and k < SIDES:
+            y = _pulled(g, x, y, normal, options)
+        way, angle = screw.gap(x, y)
+        length = tree[row, LENGTH] + math.hypot(way, 0.2 * angle)
+        verdict = KEPT
+        if _outside(y, options):
+            verdict = OUTSIDE
+        elif not edge_is_clear(g, x, y):
+            verdict = REJECTED_EDGE
+        elif _visited(y, options[CELL] * step, cells):
+            verdict = VISITED
+        _add_node(tree, count, y, row, verdict, length, _score(y, length, goal, options))
+        count += 1
+    return count
+
+
+@inner
+def _push(heap, size, score, row):
+    """Put a row on the heap, cheapest first; its new size, the same if it is full."""
+    if size == len(heap):
+        return size
+    k = size
+    while k > 0 and heap[(k - 1) // 2, 0] > score:
+        heap[k, 0], heap[k, 1] = heap[(k - 1) // 2, 0], heap[(k - 1) // 2, 1]
+        k = (k - 1) // 2
+    heap[k, 0], heap[k, 1] = score, row
+    return size + 1
+
+
+@inner
+def _pop(heap, size):
+    """The cheapest row; its place is taken by the last, which sinks."""
+    row, size = int(heap[0, 1]), size - 1
+    score, last, k = heap[size, 0], heap[size, 1], 0
+    while 2 * k + 1 < size:
+        child = 2 * k + 1
+        if child + 1 < size and heap[child + 1, 0] < heap[child, 0]:
+            child += 1
+        if heap[child, 0] >= score:
+            break
+        heap[k, 0], heap[k, 1] = heap[child, 0], heap[child, 1]
+        k = child
+    heap[k, 0], heap[k, 1] = score, last
+    return row
+
+
+@inner
+def _seen(g, x, candidates):
+    """The first candidate pose with a clear screw from x to it; -1 if there is none."""
+    for j in range(len(candidates)):
+        if screw_is_clear(g, x, screw.load8(candidates, j)):
+            return j
+    return -1
+
+
+@kernel
+def grow(g, root, candidates, tree, cells, heap, options, step, state):
+    """Grow a tree from a root pose (8,) until a node sees one of the candidate poses (m, 8).
+
+    The cheapest open leaf is taken next, at most BEAM per level; what it costs is a lower bound of what it can lead
+    to, so the first that sees a candidate is the cheapest of this tree.
+
+    Returns:
+        (row, candidate, count): the node that sees a candidate, or (-1, -1), and the number of rows of the tree.
+    """
+    for k in range(len(cells)):
+        cells[k] = -1.0
+    goal, used = screw.load8(candidates, 0), heap[len(heap) - 1 - int(options[LEVELS]) :, 2]
+    for k in range(len(used)):
+        used[k] = 0.0
+    x = (root[0], root[1], root[2], root[3], root[4], root[5], root[6], root[7])
+    _add_node(tree, 0, x, -1, KEPT, 0.0, _score(x, 0.0, goal, options))
+    _visited(x, options[CELL] * step, cells)
+    count, size = 1, _push(heap, 0, tree[0, SCORE], 0)
+    while size > 0 and count < min(len(tree), int(options[MOST])):
+        row = _pop(heap, size)
+        size -= 1
+        level = int(tree[row, LEVEL])
+        if used[level] >= options[BEAM]:
+            continue
+        used[level] += 1.0
+        j = _seen(g, screw.load8(tree, row), candidates)
+        if j >= 0:
+            tree[row, VERDICT] = GOAL_EDGE
+            return row, j, count
+        if level < int(options[LEVELS]):
+            end = expand(g, tree, row, count, goal, cells, options, step, state)
+            for k in range(count, end):
+                if tree[k, VERDICT] == KEPT:
+                    size = _push(heap, size, tree[k, SCORE], k)
+            count = end
+    return -1, -1, count
+
+
+def tree_arrays(most: int, levels: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Room for a tree of so many rows: the tree, the visited cells, the open leaves."""
+    return np.zeros((most, TREE_WIDTH)), np.full(CELLS, -1.0), np.zeros((most + levels + 1, 3))

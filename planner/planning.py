@@ -1,0 +1,291 @@
+"""The kinematic plan: one demonstration, a start, a goal and obstacles in, joints for every tick out.
+
+First the whole closed loop in one compiled call (`leg`). Where that does not arrive: other guiding poses, detours
+with other biases and less margin, and at last a search in joint space for a posture from which the rest of the
+demonstrated path can be followed. Every step of what comes back with success is proven clear of all obstacles for
+the whole arm. Not in the paper, which plans for the end effector's point.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arm import Arm
+from .body import Body
+from .errors import BadOption
+from .escape import ESCAPED, FREE
+from .joint_leg import JointSearchSettings, joint_leg
+from .leg import CHANGED, DETOURS, FOLLOWED, FULL, GUIDE, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
+from .motions import MotionSettings
+from .pose import Pose, PosePath
+from .pursuit import ARRIVED
+from .repet import REASONS, EscapeTree, RepetSettings
+from .safety import SafetySettings
+from .scene_work import SceneWork, checked_obstacles
+from .shapes import Obstacle
+from .workspace import bound
+
+Corner = tuple[float, float, float]
+BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.5, 0.0),
+                              (0.0, -0.5, 0.0))  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSettings:
+    """How a leg is planned.
+
+    Attributes:
+        motion: imitation, controller and pursuit.
+        repet: escape trees.
+        safety: the layer that keeps the whole arm clear.
+        search: the search in joint space; None for none.
+        biases: what detours are tried for, one after the other; see `RepetSettings.bias`.
+        tight: factor of the planning margin in the second half of the tries.
+        spacing: screw length [m] between poses of a blend.
+        max_seconds: longest motion.
+        avoid: False: no detours and no search, the safety layer alone.
+    """
+
+    motion: MotionSettings = field(default_factory=MotionSettings)
+    repet: RepetSettings = field(default_factory=RepetSettings)
+    safety: SafetySettings = field(default_factory=SafetySettings)
+    search: JointSearchSettings | None = field(default_factory=JointSearchSettings)
+    biases: tuple[Corner, ...] = BIASES
+    tight: float = 0.7
+    spacing: float = 0.01
+    max_seconds: float = 30.0
+    avoid: bool = True
+
+    def __post_init__(self):
+        if not 0.0 < self.tight <= 1.0:
+            raise BadOption("tight", f"{self.tight} is not in (0, 1]")
+        if not self.biases:
+            raise BadOption("biases", "there must be at least one")
+        for name in ("spacing", "max_seconds"):
+            if not 0 < getattr(self, name) < 3600:
+                raise BadOption(name, f"{getattr(self, name)} is not a positive number below 3600")
+        if self.repet.distance * self.tight < self.safety.distance:
+            reason = f"{self.repet.distance} times {self.tight} is below the safety distance {self.safety.distance}"
+            raise BadOption("repet.distance", reason)
+
+
+class Plan(NamedTuple):
+    """A planned leg.
+
+    Attributes:
+        joints: (t, dof) joints at every tick, from the start; only the start where nothing was found.
+        dt: seconds between them.
+        reason: "" if the plan arrives and every step of it is proven clear; else why there is none.
+        how: "direct", "escape" or "joint search".
+        imitated: the demonstration moved to the goal.
+        path: what was followed: the imitated path behind the guiding pose, or a detour.
+        tree: the last escape tree, None if none was grown.
+        detours: number of them.
+        margin: smallest joint margin on the way [rad].
+        changed: ticks in which the safety layer changed the command.
+        tries: closed loops that were tried.
+        seconds: that planning took.
+    """
+
+    joints: np.ndarray
+    dt: float
+    reason: str
+    how: str
+    imitated: PosePath
+    path: PosePath
+    tree: EscapeTree | None
+    detours: int
+    margin: float
+    changed: int
+    tries: int
+    seconds: float
+
+    @property
+    def success(self) -> bool:
+        """The plan arrives, and every step of it is proven clear."""
+        return not self.reason
+
+
+class Problem(NamedTuple):
+    """A leg to plan; see `Planner.plan`."""
+
+    demonstrated: PosePath
+    start: np.ndarray
+    goal: Pose
+    obstacles: tuple[Obstacle, ...] = ()
+    seed: int = 0
+
+
+class Planner:
+    """Plans legs of one arm; keeps its arrays, so use one per thread.
+
+    Args:
+        arm: the arm.
+        body: its capsules, held object included.
+        settings: see `PlanSettings`.
+    """
+
+    def __init__(self, arm: Arm, body: Body, settings: PlanSettings | None = None):
+        self.arm, self.body, self.settings = arm, body, settings or PlanSettings()
+        motion = self.settings.motion
+        self._work = bound(arm, motion.controller.packed(), motion.pursuit.packed())
+        self._buffers: Buffers = buffers(self.settings.repet, arm.dof, round(self.settings.max_seconds / motion.dt))
+        self._memory, self._wish, self._out = np.zeros(4), np.empty(arm.dof), np.empty(arm.dof)
+
+    def plan(
+        self,
+        demonstrated: PosePath,
+        start: ArrayLike,
+        goal: Pose,
+        obstacles: Sequence[Obstacle] = (),
+        *,
+        allowed: Sequence[tuple[str, str]] = (),
+        leaving: PosePath | None = None,
+        onward: PosePath | None = None,
+        seed: int = 0,
+    ) -> Plan:
+        """Plan a leg.
+
+        Args:
+            demonstrated: the segment to imitate, any number of poses.
+            start: (dof,) joints now.
+            goal: where the tcp must end.
+            obstacles: as they are now; they are taken to stand still.
+            allowed: pairs of names (part of the body or held object, obstacle) that may touch.
+            leaving: how to leave, from the pose at `start` on; None: blend at once.
+            onward: the next leg's path: in a search, postures from which it can be followed are preferred.
+            seed: of all random choices; the same seed gives the same plan.
+        """
+        begun = time.perf_counter()
+        q = self.arm.checked(start)
+        scene = SceneWork.of(self.arm, self.body, checked_obstacles(obstacles), self.settings, allowed)
+        reason = self._unfit(scene, q, goal)
+        if reason:
+            return self._failed(reason, q, demonstrated, begun)
+        lead = (leaving.dqs if leaving is not None else self.arm.fk(q).dq[None]).copy()
+        best, tries = "", 0
+        for fraction, bias, factor in self._attempts():
+            tries += 1
+            status, pursuit, margin = self._leg(scene, demonstrated, goal, lead, q, fraction, bias, factor, seed)
+            if pursuit == ARRIVED and status in (FREE, ESCAPED):
+                how = "escape" if status == ESCAPED else "direct"
+                return self._plan(how, margin, tries, begun)
+            best = best or REASONS.get(status, "") or "ik_or_limit"
+            if not len(obstacles) and fraction == self.settings.motion.max_guide:
+                break
+        found = None
+        if self.settings.search is not None and self.settings.avoid:
+            found = joint_leg(self.arm, scene, self._work, demonstrated, goal, q, self.settings, onward, seed)
+        if found is None:
+            return self._failed(best, q, demonstrated, begun, tries)
+        self._buffers.counts[DETOURS] = self._buffers.counts[TREE_ROWS] = 0
+        plan = self._plan("joint search", found.margin, tries, begun)
+        return plan._replace(joints=found.joints, path=found.path)
+
+    def _unfit(self, scene: SceneWork, q: np.ndarray, goal: Pose) -> str:
+        if self.arm.margin(q) < 0.0:
+            return "start beyond a joint limit"
+        if scene.room(q) < 0.0:
+            return "start in collision"
+        if scene.tool_room(goal) < 0.0:
+            return "goal in collision"
+        return ""
+
+    def _attempts(self) -> Iterator[tuple[float, Corner, float]]:
+        """Guide, bias and margin factor of each closed loop that is tried, the likeliest first."""
+        guides = (self.settings.motion.guide, self.settings.motion.max_guide)
+        biases = self.settings.biases if self.settings.avoid else self.settings.biases[:1]
+        yield guides[0], biases[0], 1.0
+        yield guides[1], biases[0], 1.0
+        for bias in biases:
+            yield guides[0], bias, self.settings.tight
+        for bias in biases[1:]:
+            yield guides[1], bias, self.settings.tight
+
+    def _leg(self, scene, demonstrated, goal, lead, q, fraction, bias, factor, seed):
+        b, motion = self._buffers, self.settings.motion
+        tool = scene.tool(factor)
+        packed = self.settings.repet.packed() if bias == BIASES[0] else replace(self.settings.repet, bias=bias).packed()
+        b.options[:] = packed
+        b.options[22] = scene.widest(factor)
+        if not self.settings.avoid:
+            b.options[24] = 0.0  # no rounds
+        b.state[0] = float(seed % 2147483646) + 1.0
+        return leg(
+            self._work, scene.robot, tool, demonstrated.dqs, goal.dq, lead, q.copy(), fraction, self.settings.spacing,
+            motion.dt, b, self._memory, self._wish, self._out,
+        )  # fmt: skip
+
+    def _plan(self, how: str, margin: float, tries: int, begun: float) -> Plan:
+        b, counts = self._buffers, self._buffers.counts
+        rows = int(counts[TREE_ROWS])
+        return Plan(
+            b.trace[: counts[LAST] + 1].copy(),
+            self.settings.motion.dt,
+            "",
+            how,
+            PosePath(b.imitated[: counts[IMITATED]]),
+            PosePath(b.followed[: counts[FOLLOWED]]),
+            EscapeTree.from_rows(b.tree[:rows]) if rows else None,
+            int(counts[DETOURS]),
+            float(margin),
+            int(counts[CHANGED]),
+            tries,
+            time.perf_counter() - begun,
+        )
+
+    def _failed(self, reason: str, q: np.ndarray, demonstrated: PosePath, begun: float, tries: int = 0) -> Plan:
+        b, rows = self._buffers, int(self._buffers.counts[TREE_ROWS]) if tries else 0
+        tree = EscapeTree.from_rows(b.tree[:rows]) if rows else None
+        count = int(b.counts[FULL]) if tries else 0
+        path = PosePath(b.path[:count]) if count else demonstrated
+        seconds, dt = time.perf_counter() - begun, self.settings.motion.dt
+        return Plan(q[None], dt, reason, "", demonstrated, path, tree, 0, -np.inf, 0, tries, seconds)
+
+
+def plan(
+    demonstrated: PosePath,
+    start: ArrayLike,
+    goal: Pose,
+    obstacles: Sequence[Obstacle],
+    arm: Arm,
+    body: Body,
+    settings: PlanSettings | None = None,
+    seed: int = 0,
+) -> Plan:
+    """Plan one leg; see `Planner.plan`, which is faster for several."""
+    return Planner(arm, body, settings).plan(demonstrated, start, goal, obstacles, seed=seed)
+
+
+def plan_batch(
+    problems: Sequence[Problem], arm: Arm, body: Body, settings: PlanSettings | None = None, *, workers: int = 2
+) -> list[Plan]:
+    """Plans of many problems, in their order, on several cores; the same as one by one.
+
+    Args:
+        problems: the legs.
+        arm: the arm.
+        body: its capsules.
+        settings: see `PlanSettings`.
+        workers: threads; the compiled loops let go of the interpreter.
+    """
+    if not 1 <= workers <= 256:
+        raise BadOption("workers", f"{workers} is not from 1 to 256")
+
+    def run(share: Sequence[Problem]) -> list[Plan]:
+        planner = Planner(arm, body, settings)
+        return [planner.plan(p.demonstrated, p.start, p.goal, p.obstacles, seed=p.seed) for p in share]
+
+    with ThreadPoolExecutor(workers) as pool:
+        shares = list(pool.map(run, [problems[k::workers] for k in range(workers)]))
+    return [shares[k % workers][k // workers] for k in range(len(problems))]
+
+
+__all__ = ["GUIDE", "Plan", "PlanSettings", "Planner", "Problem", "plan", "plan_batch"]
