@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 FOLDERS := envs planner baselines configs bench tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lint types check perf clean
+.PHONY: help demo test slow lint types check perf soak bodies clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -49,6 +49,9 @@ check: lint types test ## lint, types and tests
 
 perf: $(VENV)/.developed ## the table of speeds
 	@$(BIN)/onedemo perf
+
+bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
+	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"
 
 clean: ## remove the environment, the caches and the builds; runs/ stays
 	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

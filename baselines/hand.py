@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ..planner.arm import Arm
+from ..planner.body import Body
 from ..planner.errors import PlanFailed
-from ..planner.motions import MotionSettings, follow
+from ..planner.motions import MotionSettings
 from ..planner.pose import Pose, PosePath
-from ..planner.pursuit import ARRIVED, STALLED
+from ..planner.reactive import DONE, FAILED, ReactivePlanner, ReactiveSettings
+from ..planner.shapes import Shape
 from .policy import Observation
+from .surroundings import Surroundings
 
 OPEN, CLOSE = -1.0, 1.0
 Actions = Iterator[np.ndarray]
 
 
 class Hand:
-    """Commanded joints and gripper of one arm, and the latest observation.
+    """Commanded joints and gripper of one arm, what is around it, and the latest observation.
 
     The loop is closed on the joints that were commanded, not on those measured: the servos lag by 40 ms, and
     feedback of the lag oscillates at the gains wanted here.
@@ -28,11 +31,25 @@ class Hand:
         observation: the latest; the policy renews it before each tick.
     """
 
-    def __init__(self, arm: Arm, settings: MotionSettings, observation: Observation, index: int = 0):
-        self.arm, self.settings, self.index = arm, settings, index
-        self.observation = observation
+    def __init__(
+        self,
+        arm: Arm,
+        body: Body,
+        settings: ReactiveSettings,
+        surroundings: Surroundings,
+        observation: Observation,
+        index: int = 0,
+    ):
+        self.arm, self.settings, self.index = arm, settings.plan.motion, index
+        self.observation, self.surroundings = observation, surroundings
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
-        self._gripper = OPEN
+        self._gripper, self._empty = OPEN, body
+        self._planner = ReactivePlanner(arm, body, settings)
+
+    @property
+    def motion(self) -> MotionSettings:
+        """How motions are made."""
+        return self.settings
 
     @property
     def measured_tcp(self) -> Pose:
@@ -47,23 +64,38 @@ class Hand:
         """Where an object must end."""
         return Pose.from_vector(self.observation["goal_pose"][index])
 
+    def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
+        """From now on object `index` is part of the arm, and no longer around it."""
+        self.surroundings.without(index)
+        self._planner.hold(self._empty.holding("held", shape, tcp_from_object, self.arm))
+
+    def release(self) -> None:
+        """From now on the hand is empty."""
+        self.surroundings.without(None)
+        self._planner.hold(self._empty)
+
+    def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
+        """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
+        self.surroundings.allowed = tuple(contacts)
+
     def follow(self, path: PosePath, *, loosely: bool = False) -> Actions:
-        """Follow a path to its end.
+        """Follow a path to its end, round what is in the way.
 
         Raises:
-            PlanFailed: "ik_or_limit", no progress for the settings' patience.
+            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience.
         """
-        pursuit = follow(self.arm, path, self.settings, loosely=loosely)
+        self._planner.go(path, loosely=loosely)
         while True:
-            status, speeds = pursuit.step(self.q)
-            if status == ARRIVED:
+            command = self._planned()
+            if command.state == DONE:
                 return
-            if status == STALLED:
-                raise PlanFailed("ik_or_limit", self._stall_detail(pursuit.index, len(path)))
-            yield self._command(speeds)
+            if command.state == FAILED:
+                raise PlanFailed(command.reason, self._stall_detail())
+            yield self._action(command.velocity)
 
     def wait(self, seconds: float) -> Actions:
         """Stand still with the gripper as it is."""
+        self._planner.stop()
         for _ in range(round(seconds / self.settings.dt)):
             yield self.still()
 
@@ -73,16 +105,21 @@ class Hand:
         return self.wait(seconds)
 
     def still(self) -> np.ndarray:
-        """The action of standing still."""
-        return self._command(np.zeros(self.arm.dof))
+        """The action of standing still, or of retreating from what comes too close."""
+        self._planner.stop()
+        return self._action(self._planned().velocity)
 
-    def _command(self, speeds: np.ndarray) -> np.ndarray:
+    def _planned(self):
+        self._planner.see(self.surroundings.seen(self.observation), self.surroundings.allowed)
+        return self._planner.step(self.q)
+
+    def _action(self, speeds: np.ndarray) -> np.ndarray:
         normalized = np.clip(speeds / self.arm.velocity_limits, -1.0, 1.0)
         self.q = self.q + self.settings.dt * normalized * self.arm.velocity_limits
         return np.append(normalized, self._gripper)
 
-    def _stall_detail(self, index: int, count: int) -> str:
+    def _stall_detail(self) -> str:
         margins = np.minimum(self.q - self.arm.lower, self.arm.upper - self.q)
         joint = int(np.argmin(margins))
         near = f"{self.arm.joint_names[joint]} is {margins[joint]:.3f} rad from its limit"
-        return f"no progress at pose {index + 1} of {count}; {near}"
+        return f"no progress; {near}"

@@ -11,9 +11,14 @@ from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadOption, PlanFailed, UnknownName
 from ..planner.motions import MotionSettings
+from ..planner.planning import PlanSettings
+from ..planner.reactive import ReactiveSettings
+from ..planner.repet import RepetSettings
+from ..planner.safety import SafetySettings
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
 from .stack_program import StackProgram
+from .surroundings import Surroundings
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +27,8 @@ class ScrewSettings:
 
     Attributes:
         motion: the motions; see `MotionSettings`.
+        repet: detours round obstacles; see `RepetSettings`.
+        safety: the layer that keeps the arm clear; see `SafetySettings`.
         resample: screw length [m] between the poses of a demonstrated segment; removes pauses and trembling
             from the rule that advances along the path.
         trim: distance [m] to the end of the transfer at which its tail is cut, because people fumble there.
@@ -33,6 +40,8 @@ class ScrewSettings:
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
+    repet: RepetSettings = field(default_factory=RepetSettings)
+    safety: SafetySettings = field(default_factory=SafetySettings)
     resample: float = 0.005
     trim: float = 0.02
     release_height: float = 0.005
@@ -47,6 +56,12 @@ class ScrewSettings:
         for name in ("release_height", "settle", "close", "open"):
             if getattr(self, name) < 0:
                 raise BadOption(name, f"{getattr(self, name)} is negative")
+
+    @property
+    def reactive(self) -> ReactiveSettings:
+        """The settings as the reactive planner takes them; a stalled motion gives up as `motion.pursuit` says."""
+        plan = PlanSettings(motion=self.motion, repet=self.repet, safety=self.safety)
+        return ReactiveSettings(plan=plan, patience=self.motion.pursuit.patience)
 
 
 PROGRAMS = {"stack": StackProgram}
@@ -77,7 +92,8 @@ class ScrewPolicy(EpisodePolicy):
 
     def begin(self, observation: Observation) -> Episode:
         """A new episode; nothing is planned yet."""
-        hand = Hand(self.task.arms[0], self.settings.motion, observation)
+        around = Surroundings(self.task)
+        hand = Hand(self.task.arms[0], self.task.bodies[0], self.settings.reactive, around, observation)
         return Episode(hand, PROGRAMS[self.task.name](self.task, self.demonstration, self.settings, hand))
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:

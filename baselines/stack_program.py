@@ -17,8 +17,10 @@ from ..planner.errors import PlanFailed
 from ..planner.motions import Motion, plan_motion, reachable_departure
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
+from ..planner.shapes import Box
 from .hand import CLOSE, OPEN, Hand
 from .policy import LabeledPath
+from .surroundings import TABLE
 
 if TYPE_CHECKING:
     from .screw_policy import ScrewSettings
@@ -67,7 +69,15 @@ class StackProgram:
             yield from self._place(k)
         yield from self.hand.follow(self._way_out(self.withdrawal), loosely=True)
 
+    def _wanted(self, k: int) -> tuple[tuple[str, str], ...]:
+        """Contacts that belong to moving object k: of fingers with it and with what it stands on, of it with that."""
+        objects = self.task.objects
+        under = [TABLE] + [objects[j].name for j in (k - 1,) if j >= 0]
+        own = [("fingers", objects[j].name) for j in (k - 1, k) if j >= 0]
+        return (*own, *(("held", name) for name in under))
+
     def _fetch(self, k: int) -> Iterator[np.ndarray]:
+        self.hand.allow(self._wanted(k))
         motion = self._chosen_fetch(k)
         self.paths.append(LabeledPath("final", f"fetch {self.task.objects[k].name}", motion.final_path))
         if motion.departure is not None:
@@ -79,6 +89,7 @@ class StackProgram:
     def _place(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
         grasped = self._held(k)
+        self.hand.hold(k, Box(tuple(target.size)), grasped)
         lift = self._way_out(self.transfer)
         yield from self.hand.follow(lift, loosely=True)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
@@ -90,6 +101,7 @@ class StackProgram:
         yield from self.hand.follow(motion.tail)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(OPEN, self.settings.open)
+        self.hand.release()
 
     def _way_out(self, leaving: PosePath) -> PosePath:
         return reachable_departure(self.hand.arm, self.hand.q, leaving, self.settings.motion)[0]

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from . import demo_commands
 from .console import console, labeled
 
-USAGE_ERROR = 2
+BAD_INPUT, INTERRUPTED = 2, 130
+USAGE: Any = typer.BadParameter.__base__
+"""What typer raises for a wrong command line; of typer itself or of click, as the version has it."""
+NO_LIBRARY = "cannot open shared object file"
+PACKAGES = "apt install libgl1 libglib2.0-0"
 app = typer.Typer(
     help="One demonstration in, a robot policy out, and a benchmark that proves it.\n\nStart with: onedemo run stack",
     no_args_is_help=True,
@@ -72,12 +76,39 @@ def version() -> None:
     console().print(installed("onedemo"))
 
 
+def usage_line(error: Any) -> str:
+    """What is wrong with the command line and what is allowed; "" if help was printed instead."""
+    text = " ".join(error.format_message().split()).rstrip(".")
+    context = getattr(error, "ctx", None)
+    if not text or context is None:
+        return text
+    options = ", ".join(
+        sorted(name for each in context.command.get_params(context) for name in each.opts if "-" in name)
+    )
+    commands = getattr(context.command, "commands", None)
+    if commands is not None:
+        return f"{text}; {context.command_path} knows: {', '.join(commands)}, {options}"
+    pieces = " ".join(context.command.collect_usage_pieces(context))
+    return f"{text}; usage: {context.command_path} {pieces}; options: {options}"
+
+
 def main() -> None:
-    """Entry point: errors of the project become one line and exit code 2."""
+    """Entry point: errors of the project and of the command line become one line, exit code 2."""
     from ..planner.errors import OneDemoError
 
     try:
-        app(prog_name="onedemo")
+        sys.exit(app(prog_name="onedemo", standalone_mode=False) or 0)
+    except USAGE as error:
+        reason, code = usage_line(error), BAD_INPUT
+    except typer.Abort:
+        reason, code = "stopped", INTERRUPTED
     except OneDemoError as error:
-        console(stderr=True).print(labeled("error", "red", str(error)))
-        sys.exit(USAGE_ERROR)
+        reason, code = str(error), BAD_INPUT
+    except (ImportError, OSError) as error:
+        if NO_LIBRARY not in str(error):
+            raise
+        library = str(error).partition(":")[0]
+        reason, code = f"the library {library} is missing, which OpenCV in robosuite loads: {PACKAGES}", BAD_INPUT
+    if reason:
+        console(stderr=True).print(labeled("error", "red", reason))
+    sys.exit(code)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import console, labeled
+from .console import check_writable, console, labeled, writing
 
 if TYPE_CHECKING:
     from ..planner.demo import Demonstration, Segment
@@ -70,14 +70,15 @@ def import_(
     forward kinematics and is cut where the gripper moves. Rows of poses (.npy or .csv: x y z and a quaternion)
     are cut where the hand rests.
 
-    Examples:
-    - onedemo demo import panda_teleop_stack.npz --output stack.npz --licence MIT
+    Examples (the first one makes the shipped demonstration, up to rounding):
+    - onedemo demo import panda_teleop_stack.npz -o stack.npz --licence "MIT, see LICENSE-robosuite.txt"
 
     - onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100
     """
     from ..planner.demo_io import save_demonstration
     from ..planner.recordings import from_pose_table, stack_from_teleoperation
 
+    check_writable("--output", output)
     title = name or output.stem
     if raw.suffix == ".npz":
         from ..envs.scene import robot_arm
@@ -94,7 +95,8 @@ def import_(
             source=source,
             licence=licence,
         )
-    save_demonstration(demo, output)
+    with writing("--output", output):
+        save_demonstration(demo, output)
     console().print(f"wrote {output}: {len(demo.path)} samples, {len(demo.segments)} segments")
 
 

@@ -3,84 +3,54 @@
 from __future__ import annotations
 
 import json
-import statistics
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict
 from fnmatch import fnmatch
 from importlib import import_module
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .console import console, labeled
+from ..planner.errors import UnknownName
+from .console import check_writable, console, labeled, writing
+from .measuring import Row, row, seconds_per_call
 
-BATCHES = 15
-BATCH_SECONDS = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One measured line.
-
-    Attributes:
-        name: what is measured.
-        value: the figure; None where it could not be measured.
-        unit: of the figure ("ratio", "us", "ms", "MB", "s").
-        goal: largest value that is well; None where there is no bar.
-        ok: the bar is met; None where there is none or nothing was measured.
-        note: what it was measured against, or why it was not.
-    """
-
-    name: str
-    value: float | None
-    unit: str
-    goal: float | None
-    ok: bool | None
-    note: str
+SWAY_STEPS = 50
+"""Control steps in which the arm of the measured scene sways once."""
 
 
-def row(name: str, value: float, unit: str, goal: float | None, note: str = "") -> Row:
-    """A measured line with its verdict."""
-    return Row(name, value, unit, goal, None if goal is None else value <= goal, note)
+TICK = "controller tick from Python / DQ_Robotics"
+KINEMATICS = "FK + Jacobian call / Pinocchio"
+STEP = "Stack step / raw mj_step"
+RESET = "Stack soft reset"
+PEER_STEP = "Stack step / robosuite's own step"
+MEMORY = "second environment in a process"
+IMPORT = "import onedemo.envs"
+START = "warm start to the first moving step"
 
 
-def seconds_per_call(*functions: Callable[[], object]) -> list[float]:
-    """Median seconds per call of each function, their batches interleaved so that noise hits all alike."""
-    counts = []
-    for function in functions:
-        function()
-        start = time.perf_counter()
-        function()
-        counts.append(max(1, round(BATCH_SECONDS / max(time.perf_counter() - start, 1e-9))))
-    samples: list[list[float]] = [[] for _ in functions]
-    for _ in range(BATCHES):
-        for function, count, sample in zip(functions, counts, samples, strict=True):
-            start = time.perf_counter()
-            for _ in range(count):
-                function()
-            sample.append((time.perf_counter() - start) / count)
-    return [statistics.median(sample) for sample in samples]
-
-
-def _controller_rows() -> Iterator[Row]:
+def _panda() -> tuple[Any, np.ndarray, np.ndarray]:
+    """The workspace of the Panda's controller, joints, and a target (8,) in reach."""
     from ..planner.arm import Arm
-    from ..planner.controller import ControllerSettings, tick
-    from ..planner.workspace import bound, refresh
+    from ..planner.controller import ControllerSettings
+    from ..planner.workspace import bound
 
-    urdf = _panda_urdf()
-    arm = Arm.from_urdf(urdf, tcp_frame="panda_link8")
+    arm = Arm.from_urdf(_panda_urdf(), tcp_frame="panda_link8")
     q = np.array([0.0, 0.2, 0.0, -2.6, 0.0, 2.9, 0.78])
-    target, qdot = np.array(arm.fk(q + 0.1).dq), np.empty(7)
-    work = bound(arm, ControllerSettings(law="paper").packed())
-    yield from _peer_tick_row(lambda: tick(work, q, target, 1.0, qdot), q, target)
+    return bound(arm, ControllerSettings(law="paper").packed()), q, np.array(arm.fk(q + 0.1).dq)
 
+
+def _kinematics() -> Row:
     import pinocchio as pin
 
-    model = pin.buildModelFromUrdf(str(urdf))
+    from ..planner.workspace import refresh
+
+    work, q, _ = _panda()
+    model = pin.buildModelFromUrdf(str(_panda_urdf()))
     data, frame = model.createData(), model.getFrameId("panda_link8")
 
     def pinocchio() -> np.ndarray:
@@ -91,17 +61,19 @@ def _controller_rows() -> Iterator[Row]:
 
     ours, theirs = seconds_per_call(lambda: refresh(work, q), pinocchio)
     note = f"{ours * 1e6:.2f} us against {theirs * 1e6:.2f} us (computeFrameJacobian, updateFramePlacement)"
-    yield row("FK + Jacobian call / Pinocchio", ours / theirs, "ratio", 0.7, note)
+    return row(KINEMATICS, ours / theirs, "ratio", 0.7, note)
 
 
-def _peer_tick_row(ours: Callable[[], object], q: np.ndarray, target: np.ndarray) -> Iterator[Row]:
-    name, goal = "controller tick from Python / DQ_Robotics", 1 / 12
+def _tick() -> Row:
+    from ..planner.controller import tick
+
+    goal = 1 / 12
     try:
         peer = import_module("dqrobotics")
         robots, algebra = import_module("dqrobotics.robots"), import_module("dqrobotics.utils.DQ_LinearAlgebra")
     except ImportError:
-        yield Row(name, None, "ratio", goal, None, "needs: pip install 'onedemo[peers]'")
-        return
+        return Row(TICK, None, "ratio", goal, None, "needs: pip install 'onedemo[peers]'")
+    (work, q, target), qdot = _panda(), np.empty(7)
     robot = robots.FrankaEmikaPandaRobot.kinematics()
     goal_pose, one, c8, pull = peer.DQ(target), peer.DQ([1.0]), peer.C8(), -0.1 * q
 
@@ -112,9 +84,9 @@ def _peer_tick_row(ours: Callable[[], object], q: np.ndarray, target: np.ndarray
         inverse = algebra.pinv(n)
         return inverse @ (15.0 * error) + pull - inverse @ (n @ pull)
 
-    mine, peers = seconds_per_call(ours, theirs)
+    mine, peers = seconds_per_call(lambda: tick(work, q, target, 1.0, qdot), theirs)
     note = f"{mine * 1e6:.2f} us against {peers * 1e6:.1f} us, the corrected paper law with null space"
-    yield row(name, mine / peers, "ratio", goal, note)
+    return row(TICK, mine / peers, "ratio", goal, note)
 
 
 def _panda_urdf() -> Path:
@@ -127,33 +99,61 @@ def _panda_urdf() -> Path:
     return folder / "panda_arm.urdf"
 
 
-def _step_rows() -> Iterator[Row]:
+def _stack(**options: Any) -> Any:
+    """The environment, started from seed 0."""
     import gymnasium as gym
-    import mujoco
 
     from .. import envs  # noqa: F401  (registers the ids)
 
-    env: Any = gym.make("onedemo/Stack-v0").unwrapped
+    env: Any = gym.make("onedemo/Stack-v0", **options).unwrapped
     env.reset(seed=0)
-    model, data = env.sim.model, env.sim.data
-    action, substeps = np.zeros(env.action_space.shape), env.substeps
-    env.step(action)
-    ours, raw = seconds_per_call(lambda: env.step(action), lambda: mujoco.mj_step(model, data, substeps))
-    note = f"{ours * 1e3:.3f} ms against {raw * 1e3:.3f} ms for {substeps} substeps"
-    yield row("Stack step / raw mj_step", ours / raw, "ratio", 1.15, note)
+    return env
 
-    (reset,) = seconds_per_call(lambda: env.reset())
-    yield row("Stack soft reset", reset * 1e3, "ms", 3.0)
 
-    two: Any = gym.make("onedemo/Stack-v0", n_blocks=2).unwrapped
-    peer = _robosuite_stack()
-    two.reset(seed=0)
+def _step() -> Row:
+    """Two scenes on the same way: one stepped as users do, one by MuJoCo alone under the controls of the first."""
+    import mujoco
+
+    env, bare = _stack(), _stack()
+    model, data, substeps = bare.sim.model, bare.sim.data, env.substeps
+    sway = np.sin(2.0 * np.pi * np.arange(SWAY_STEPS) / SWAY_STEPS)
+    actions, controls = 0.1 * sway[:, None] * np.append(np.ones(len(env.action_space.low) - 1), 0.0), []
+    for action in actions:
+        env.step(action)
+        controls.append(env.sim.data.ctrl.copy())
+    env.reset(seed=0)
+    ours, theirs = cycle(actions), cycle(controls)
+
+    def step() -> None:
+        env.step(next(ours))
+
+    def raw() -> None:
+        data.ctrl[:] = next(theirs)
+        mujoco.mj_step(model, data, substeps)
+
+    mine, physics = seconds_per_call(step, raw, together=True)
+    assert np.array_equal(env.sim.data.qpos, data.qpos), "the two scenes went different ways"
+    note = (
+        f"{mine * 1e3:.3f} ms against {physics * 1e3:.3f} ms for {substeps} substeps; two scenes with a swaying arm, "
+        "from the same start, under the same controls, to the same bits"
+    )
+    return row(STEP, mine / physics, "ratio", 1.15, note)
+
+
+def _reset() -> Row:
+    env = _stack()
+    (seconds,) = seconds_per_call(lambda: env.reset())
+    return row(RESET, seconds * 1e3, "ms", 3.0)
+
+
+def _peer_step() -> Row:
+    two, peer = _stack(n_blocks=2), _robosuite_stack()
     peer.reset()
-    idle = np.zeros(peer.action_dim)
+    action, idle = np.zeros(two.action_space.shape), np.zeros(peer.action_dim)
     ours, theirs = seconds_per_call(lambda: two.step(action), lambda: peer.step(idle))
     ours, theirs = ours / two.control_dt, theirs * peer.control_freq
     note = f"per simulated second {ours * 1e3:.1f} ms against {theirs * 1e3:.0f} ms, two blocks each"
-    yield row("Stack step / robosuite's own step", ours / theirs, "ratio", 1 / 8, note)
+    return row(PEER_STEP, ours / theirs, "ratio", 1 / 8, note)
 
 
 def _robosuite_stack() -> Any:
@@ -198,18 +198,17 @@ print(time.perf_counter() - start)
 """
 
 
-def _process_rows() -> Iterator[Row]:
-    yield row("second environment in a process", _measured(_MEMORY), "MB", 120.0, "growth of the resident memory")
-    seconds = _measured(_IMPORT)
-    yield row("import onedemo.envs", seconds, "s", 2.0, "without importing robosuite")
+def _memory() -> Row:
+    return row(MEMORY, _measured(_MEMORY), "MB", 120.0, "growth of the resident memory")
+
+
+def _import() -> Row:
+    return row(IMPORT, _measured(_IMPORT), "s", 2.0, "without importing robosuite")
+
+
+def _start() -> Row:
     _measured(_START)
-    yield row(
-        "warm start to the first moving step",
-        _measured(_START),
-        "s",
-        10.0,
-        "a new process, compiled kernels cached",
-    )
+    return row(START, _measured(_START), "s", 10.0, "a new process, compiled kernels cached")
 
 
 def _measured(code: str) -> float:
@@ -218,35 +217,64 @@ def _measured(code: str) -> float:
     return float(done.stdout.split()[-1])
 
 
-GROUPS = {"controller": _controller_rows, "step": _step_rows, "process": _process_rows}
+Lines = dict[str, Callable[[], Row]]
+GROUPS: dict[str, Lines] = {
+    "controller": {TICK: _tick, KINEMATICS: _kinematics},
+    "step": {STEP: _step, RESET: _reset, PEER_STEP: _peer_step},
+    "process": {MEMORY: _memory, IMPORT: _import, START: _start},
+}
+"""Per group its lines: what is measured, and how."""
 
 
-def measure(pattern: str = "*") -> Iterator[Row]:
-    """The lines whose group (controller, step, process) or name matches a shell pattern."""
-    for group, rows in GROUPS.items():
-        for line in rows():
-            if fnmatch(group, pattern) or fnmatch(line.name.lower(), f"*{pattern.lower()}*"):
-                yield line
+def matching(pattern: str) -> Lines:
+    """The lines whose group or name matches a shell pattern, or whose name contains it; nothing is measured yet.
+
+    Raises:
+        UnknownName: there are none; the message lists groups and lines.
+    """
+    found = {
+        name: measure
+        for group, lines in GROUPS.items()
+        for name, measure in lines.items()
+        if fnmatch(group, pattern) or fnmatch(name.lower(), f"*{pattern.lower()}*")
+    }
+    if not found:
+        names = [name for lines in GROUPS.values() for name in lines]
+        raise UnknownName("group or line of perf", pattern, [*GROUPS, *names])
+    return found
 
 
 def write_json(rows: list[Row], path: Path) -> None:
     """The lines as `{"rows": [...]}`."""
-    path.write_text(json.dumps({"rows": [asdict(line) for line in rows]}, indent=2) + "\n")
+    path.write_text(json.dumps({"rows": [asdict(line) for line in rows]}, indent=2) + "\n", encoding="utf-8")
 
 
 def run_perf(pattern: str, json_file: Path | None) -> int:
-    """Measure and print a table; exit code 1 if a bar is missed."""
+    """Measure and print a table; exit code 1 if a bar is missed.
+
+    Raises:
+        UnknownName: nothing matches the pattern.
+        BadConfig: the file cannot be written, which is found before anything is measured.
+    """
+    wanted = matching(pattern)
+    if json_file:
+        check_writable("--json", json_file)
     out, rows = console(), []
     out.print("a line is well when its value is at most its goal")
-    with console(stderr=True).status("measuring"):
-        for line in measure(pattern):
-            rows.append(line)
-            value = "-" if line.value is None else f"{line.value:.3g} {line.unit}"
-            goal = "" if line.goal is None else f"(goal {line.goal:.3g})"
-            word, style = {True: ("ok    ", "green"), False: ("missed", "red"), None: ("-     ", "")}[line.ok]
-            out.print(labeled(word, style, f"{line.name}: {value} {goal}"))
-            if line.note:
-                out.print(f"        {line.note}", style="dim")
-    if json_file is not None:
-        write_json(rows, json_file)
+    for name, measure in wanted.items():
+        with console(stderr=True).status(f"measuring: {name}"):
+            rows.append(measure())
+        _print(out, rows[-1])
+    if json_file:
+        with writing("--json", json_file):
+            write_json(rows, json_file)
     return 1 if any(line.ok is False for line in rows) else 0
+
+
+def _print(out: Any, line: Row) -> None:
+    value = "-" if line.value is None else f"{line.value:.3g} {line.unit}"
+    goal = "" if line.goal is None else f"(goal {line.goal:.3g})"
+    word, style = {True: ("ok    ", "green"), False: ("missed", "red"), None: ("-     ", "")}[line.ok]
+    out.print(labeled(word, style, f"{line.name}: {value} {goal}"))
+    if line.note:
+        out.print(f"        {line.note}", style="dim")

@@ -13,7 +13,7 @@ from .statistics import median, wilson
 
 
 def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
-    """The numbers of one cell: method, task, robot, level and what came of it."""
+    """The numbers of one cell: method, task, robot, level and what came of it; None where there is nothing to tell."""
     successes = sum(record.success for record in records)
     low, high = wilson(successes, len(records))
     worst = [1e3 * max(record.position_error) for record in records if record.success]
@@ -27,34 +27,45 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
         "safe_successes": sum(record.safe_success for record in records),
         "wilson_low": round(low, 4),
         "wilson_high": round(high, 4),
-        "seconds_median": median([record.seconds for record in records]),
-        "seconds_max": max((record.seconds for record in records), default=float("nan")),
-        "position_error_mm_median": median(worst),
-        "position_error_mm_max": max(worst, default=float("nan")),
-        "tick_us_median": median([record.tick_us[0] for record in records]),
-        "tick_us_p99": median([record.tick_us[1] for record in records]),
-        "tick_us_max": max((record.tick_us[2] for record in records), default=float("nan")),
+        **_middle_and_most("seconds", [record.seconds for record in records]),
+        **_middle_and_most("position_error_mm", worst),
+        **_middle_and_most("tick_us", [record.tick_us[0] for record in records]),
+        "tick_us_p99": _middle([record.tick_us[1] for record in records]),
+        "tick_us_max": max((record.tick_us[2] for record in records), default=None),
         "failures": dict(Counter(record.failure_reason for record in records if not record.success)),
     }
+
+
+def _middle(values: list[float]) -> float | None:
+    return median(values) if values else None
+
+
+def _middle_and_most(key: str, values: list[float]) -> dict[str, float | None]:
+    return {f"{key}_median": _middle(values), f"{key}_max": max(values, default=None)}
 
 
 def verdict(row: dict[str, Any]) -> list[str]:
     """Three lines for the terminal and the top of the report."""
     failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
-    times = f"{row['tick_us_median']:.0f} us per tick (median), {row['tick_us_p99']:.0f} us (p99)"
+    times = f"{_said(row['tick_us_median'], '.0f')} us per tick (median), {_said(row['tick_us_p99'], '.0f')} us (p99)"
+    error = row["position_error_mm_max"]
+    largest = "no success, so no error" if error is None else f"largest position error {error:.1f} mm in the successes"
     return [
         f"{row['successes']} of {row['episodes']} succeeded at {row['level']} "
         f"(Wilson 95 %: {row['wilson_low']:.2f} to {row['wilson_high']:.2f}), "
         f"{row['safe_successes']} without any unwanted contact",
-        f"{row['seconds_median']:.1f} s simulated per episode (median), "
-        f"largest position error {row['position_error_mm_max']:.1f} mm in the successes",
+        f"{_said(row['seconds_median'])} s simulated per episode (median), {largest}",
         f"planner {times}; failures: {failures}",
     ]
 
 
 def write_summary(path: Path, rows: list[dict[str, Any]]) -> None:
     """The rows as `{"rows": [...]}`."""
-    path.write_text(json.dumps({"rows": rows}, indent=2) + "\n", encoding="utf-8")
+    path.write_text(json.dumps({"rows": rows}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _said(value: float | None, digits: str = ".1f") -> str:
+    return "-" if value is None else f"{value:{digits}}"
 
 
 def report_text(
@@ -79,6 +90,7 @@ def report_text(
 def _table(row: dict[str, Any]) -> str:
     head = "| method | task | robot | level | episodes | success | safe success | Wilson 95 % | time [s] | error [mm] |"
     line = "|---|---|---|---|---|---|---|---|---|---|"
+    error = "position_error_mm_"
     cells = (
         row["method"],
         row["task"],
@@ -88,8 +100,8 @@ def _table(row: dict[str, Any]) -> str:
         row["successes"],
         row["safe_successes"],
         f"{row['wilson_low']:.2f} to {row['wilson_high']:.2f}",
-        f"{row['seconds_median']:.1f} (max {row['seconds_max']:.1f})",
-        f"{row['position_error_mm_median']:.1f} (max {row['position_error_mm_max']:.1f})",
+        f"{_said(row['seconds_median'])} (max {_said(row['seconds_max'])})",
+        "no success" if not row["successes"] else f"{_said(row[error + 'median'])} (max {_said(row[error + 'max'])})",
     )
     return "\n".join([head, line, "| " + " | ".join(_cell(cell) for cell in cells) + " |"])
 

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import warnings
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..configs.schema import RunConfig, load_config
 from ..configs.shipped import shipped_config
-from ..planner.errors import BadConfig
-from .console import console, labeled
+from ..planner.errors import BadConfig, BadDemonstration
+from .console import COMMAND_LINE, console, labeled
 from .demo_commands import demonstration_path
 from .records import FILE, EpisodeRecord, RecordWriter, locked, read_records
 from .scenarios import scenarios_of
 
 if TYPE_CHECKING:
     from ..baselines.policy import Policy
+    from ..planner.demo import Demonstration
 
 DISK_FULL, INTERRUPTED = 3, 130
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 IDS = {"stack": "onedemo/Stack-v0"}
+MOTIONS = {"stack": ("approach", "transfer")}
+"""Segments that a demonstration of a task must have."""
 
 
 def run_config(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
@@ -35,9 +41,12 @@ def run_config(config: str, overrides: list[str], output: Path, *, quiet: bool =
     folder = output / f"{settings.name}-{settings.digest()}"
     err = console(stderr=True, quiet=quiet)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with locked(folder):
-            lines = _run(settings, source, folder, " ".join(["onedemo run", config, *overrides]), err)
+        with ExitStack() as held:
+            _open_folder(folder, held)
+            env, policy = _built(settings, source, overrides, err)
+            held.callback(env.close)
+            command = " ".join(["onedemo run", config, *overrides])
+            lines = _run(env, policy, settings, folder, command, err)
     except KeyboardInterrupt:
         err.print(f"stopped; finished episodes are kept in {folder}, running the same again goes on")
         return INTERRUPTED
@@ -63,19 +72,36 @@ def config_path(config: str) -> Path:
     raise BadConfig(path, "", "no such file")
 
 
-def _run(config: RunConfig, source: Path, folder: Path, command: str, err: Any) -> list[str]:
-    with err.status("building the scene and the planner (compiled on first use: about half a minute)"):
-        env, policy = _prepared(config, source)
+def _open_folder(folder: Path, held: ExitStack) -> None:
+    """Make the run folder and hold it for this process.
+
+    Raises:
+        BadConfig: nothing can be written there.
+        RunBusy: another process writes there.
+    """
     try:
-        _describe(config, folder)
-        records = _episodes(env, policy, config, folder, err)
-        return _report(env, policy, config, folder, records, command, err)
-    finally:
-        env.close()
+        folder.mkdir(parents=True, exist_ok=True)
+        held.enter_context(locked(folder))
+    except OSError as error:
+        if error.errno in NO_SPACE:
+            raise
+        raise BadConfig(COMMAND_LINE, "--output", f"no run folder at {folder}: {error.strerror}") from None
 
 
-def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
-    """The environment and the policy; what the config names wrongly becomes a BadConfig with its key."""
+def _built(config: RunConfig, source: Path, overrides: list[str], err: Any) -> tuple[Any, Policy]:
+    """The environment and the policy, and what is being waited for."""
+    with err.status("building the scene and the planner (compiled on first use: about half a minute)"):
+        return _prepared(config, source, overrides)
+
+
+def _run(env: Any, policy: Policy, config: RunConfig, folder: Path, command: str, err: Any) -> list[str]:
+    _describe(config, folder)
+    records = _episodes(env, policy, config, folder, err)
+    return _report(env, policy, config, folder, records, command, err)
+
+
+def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any, Policy]:
+    """The environment and the policy; what the config names wrongly becomes an error with its key."""
     import gymnasium as gym
 
     from .. import envs  # noqa: F401  (registers the ids)
@@ -83,10 +109,10 @@ def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
     from ..planner.demo_io import load_demonstration
     from ..planner.motions import warm_up
 
-    if config.task not in IDS:
-        raise BadConfig(source, "task", f"unknown task {config.task!r}; known: {', '.join(IDS)}")
-    demonstration = load_demonstration(demonstration_path(config.demonstration))
-    _check_names(config, source)
+    _check_names(config, source, overrides)
+    file = demonstration_path(config.demonstration)
+    demonstration = load_demonstration(file)
+    _check_demonstration(demonstration, file, config.task)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env: Any = gym.make(
@@ -103,15 +129,30 @@ def _prepared(config: RunConfig, source: Path) -> tuple[Any, Policy]:
     return env, make_policy(config.method, task, demonstration, config.settings)
 
 
-def _check_names(config: RunConfig, source: Path) -> None:
+def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
+    """Refuse unknown names, and say where they were written."""
     from ..baselines.factory import POLICIES
     from ..envs.layouts import LEVELS
     from ..envs.scene import ROBOTS
 
-    for key, known in (("level", LEVELS), ("robot", ROBOTS), ("method", POLICIES)):
+    changed = {text.partition("=")[0] for text in overrides}
+    for key, known in (("task", IDS), ("level", LEVELS), ("robot", ROBOTS), ("method", POLICIES)):
         value = getattr(config, key)
         if value not in known:
-            raise BadConfig(source, key, f"unknown {key} {value!r}; known: {', '.join(known)}")
+            where = COMMAND_LINE if key in changed else source
+            raise BadConfig(where, key, f"unknown {key} {value!r}; known: {', '.join(known)}")
+
+
+def _check_demonstration(demonstration: Demonstration, file: Path, task: str) -> None:
+    """Refuse a demonstration of something else."""
+    if demonstration.task != task:
+        raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
+    names = [segment.name for segment in demonstration.segments]
+    for name in MOTIONS[task]:
+        if name not in names:
+            there = ", ".join(names) or "none"
+            reason = f"{name!r} is missing; {task!r} needs {', '.join(MOTIONS[task])}, there are: {there}"
+            raise BadDemonstration(file, "segment_names", reason)
 
 
 def _describe(config: RunConfig, folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -62,11 +63,8 @@ def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video
         if film and len(tcp) % EVERY == 1:
             film.take(env)
 
-    try:
+    with film or nullcontext():
         _, report = run_episode(env, policy, scenario, config, observer)
-    finally:
-        if film:
-            film.close()
     seen.executed, seen.paths = np.array(tcp), report.paths
     seen.speed = FRAMES_PER_SECOND * EVERY * env.unwrapped.control_dt
     seen.video_problem = film.problem if film else ""
@@ -74,15 +72,31 @@ def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video
 
 
 class Film:
-    """An mp4 that is written picture by picture; it appears under its name only when it is complete."""
+    """An mp4 that is written picture by picture; it appears under its name only when all of it can be read again.
+
+    Used in a `with` statement: what is broken off leaves no file.
+    """
 
     def __init__(self, path: Path):
         self._path, self._part = path, path.with_suffix(".part.mp4")
         self._writer: Any = None
+        self._count = 0
         self.problem = ""
 
+    def __enter__(self) -> Film:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._end()
+        if kind is None and self._writer is not None and not self.problem:
+            if self._readable_pictures() == self._count:
+                self._part.replace(self._path)
+            else:
+                self.problem = "the video could not be written to its end; is the disk full?"
+        self._part.unlink(missing_ok=True)
+
     def take(self, env: Any) -> None:
-        """Add a picture, unless drawing has turned out to be impossible."""
+        """Add a picture, unless drawing or writing has turned out to be impossible."""
         if self.problem:
             return
         try:
@@ -90,15 +104,33 @@ class Film:
         except RenderingUnavailable as error:
             self.problem = str(error)
             return
+        try:
+            self._add(picture)
+        except OSError as error:  # its text is FFmpeg's whole output
+            self.problem = f"the video could not be written ({error.strerror or 'FFmpeg failed'}); is the disk full?"
+
+    def _add(self, picture: Any) -> None:
         if self._writer is None:
             import imageio
 
             options = {"fps": FRAMES_PER_SECOND, "codec": "libx264", "quality": 7, "macro_block_size": 8}
             self._writer = imageio.get_writer(self._part, format="FFMPEG", **options)
         self._writer.append_data(picture)
+        self._count += 1
 
-    def close(self) -> None:
-        """Finish the file."""
-        if self._writer is not None:
+    def _end(self) -> None:
+        if self._writer is None:
+            return
+        try:
             self._writer.close()
-            self._part.replace(self._path)
+        except OSError as error:
+            self.problem = self.problem or f"the video could not be written ({error.strerror or 'FFmpeg failed'})"
+
+    def _readable_pictures(self) -> int:
+        """How many pictures the file holds; FFmpeg does not say when it could not write its end."""
+        from imageio_ffmpeg import count_frames_and_secs
+
+        try:
+            return count_frames_and_secs(self._part)[0]
+        except (OSError, RuntimeError):
+            return 0

@@ -65,6 +65,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
         self.action_space = space.action_space(entries, len(self.arms))
         self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
+        self._action = np.zeros(self.action_space.shape or ())
         self._renderer: Renderer | None = None
 
     @property
@@ -98,7 +99,8 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         self.sim.reset(joints, poses)
         state = self.sim.read()
         _, _, info = self._judge(state)
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         return self._observation(state), info
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -107,13 +109,17 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         Raises:
             BadAction: wrong shape, or not finite.
         """
-        rows = self._checked(action).reshape(len(self.arms), -1)
-        in_joints = self.control_mode == "joint_velocity"
-        speeds = rows[:, :-1] * self._speed_limits if in_joints else self._resolved(rows)
-        self.sim.step(speeds, rows[:, -1], self.substeps)
+        self._take(action)
+        if self.control_mode == "joint_velocity":
+            bad = self.sim.step(self._action, self._speed_limits, 1.0, self.substeps)
+        else:
+            bad = self._step_twists()
+        if bad >= 0:
+            raise BadAction(f"entry {bad} is not finite")
         state = self.sim.read()
         reward, terminated, info = self._judge(state)
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         return self._observation(state), reward, terminated, False, info
 
     def render(self) -> np.ndarray | None:
@@ -131,21 +137,34 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             self._renderer = None
 
     def _show(self) -> None:
-        if self.render_mode == "human":
-            self._opened_renderer().show(self.sim.data)
+        self._opened_renderer().show(self.sim.data)
 
     def _opened_renderer(self) -> Renderer:
         if self._renderer is None:
             self._renderer = Renderer(self.sim.model)
         return self._renderer
 
-    def _checked(self, action: np.ndarray) -> np.ndarray:
-        action = np.asarray(action, dtype=np.float64)
-        if action.shape != self.action_space.shape:
-            raise BadAction(f"has shape {action.shape}; expected {self.action_space.shape}")
-        if not math.isfinite(action.sum()):
-            raise BadAction(f"entry {int(np.argmin(np.isfinite(action)))} is not finite")
-        return np.minimum(np.maximum(action, -1.0), 1.0)
+    def _take(self, action: np.ndarray) -> None:
+        """Copy an action, of whatever array type, to where the compiled code reads it."""
+        if type(action) is not np.ndarray or action.dtype != np.float64:
+            try:
+                action = np.asarray(action)
+            except ValueError:
+                raise BadAction("is not an array of numbers") from None
+            if action.dtype.kind not in "fiub":
+                raise BadAction(f"is not an array of real numbers, but of {action.dtype.name}")
+        if action.shape != self._action.shape:
+            raise BadAction(f"has shape {action.shape}; expected {self._action.shape}")
+        self._action[:] = action
+
+    def _step_twists(self) -> int:
+        """Step with tcp twists in world axes, made joint speeds by damped least squares."""
+        rows = np.clip(self._action, -1.0, 1.0).reshape(len(self.arms), -1)
+        finite = np.isfinite(rows).ravel()
+        if not finite.all():
+            return int(np.argmin(finite))
+        speeds = np.column_stack([self._resolved(rows), rows[:, -1]])
+        return self.sim.step(speeds.ravel(), np.ones_like(self._speed_limits), math.inf, self.substeps)
 
     def _resolved(self, rows: np.ndarray) -> np.ndarray:
         """Joint speeds (n_arms, dof) of tcp twists in world axes, by damped least squares."""

@@ -14,6 +14,9 @@ import numpy as np
 
 from ..planner.arm import Arm
 from ..planner.errors import UnknownName
+from ..planner.pose import Pose
+from ..planner.shapes import Box as BoxShape
+from ..planner.shapes import Capsule, Cylinder, Obstacle, Shape, Sphere
 from .boxes import Box
 
 ROBOTS = {
@@ -66,6 +69,7 @@ class Scene:
         objects: body ids of the boxes.
         owner: (ngeom,) whose geom it is, see WORLD.
         labels: (ngeom,) names for messages.
+        fixtures: what stands still for ever and is solid, the robot's own base and the floor left out.
     """
 
     model: mujoco.MjModel
@@ -74,6 +78,7 @@ class Scene:
     objects: np.ndarray
     owner: np.ndarray
     labels: tuple[str, ...]
+    fixtures: tuple[Obstacle, ...]
 
 
 @lru_cache(maxsize=8)
@@ -92,7 +97,7 @@ def compiled_scene(robot: str, boxes: tuple[Box, ...]) -> Scene:
     home = np.array(rob.init_qpos, dtype=np.float64).reshape(len(arms), -1)
     bodies = [_id(model, mujoco.mjtObj.mjOBJ_BODY, box.root_body) for box in env.boxes]
     owner, labels = _owners(model, env, boxes, bodies)
-    return Scene(model, arms, home, np.array(bodies), owner, labels)
+    return Scene(model, arms, home, np.array(bodies), owner, labels, _fixtures(model, owner))
 
 
 def robot_arm(robot: str, index: int = 0) -> Arm:
@@ -175,3 +180,30 @@ def _owners(model: mujoco.MjModel, env, boxes: tuple[Box, ...], bodies: list[int
         else:
             labels.append("table" if "table" in name else name or "world")
     return owner, tuple(labels)
+
+
+def _fixtures(model: mujoco.MjModel, owner: np.ndarray) -> tuple[Obstacle, ...]:
+    """The solid, unmoving geoms of a model that belong to nobody, as shapes in the world."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = []
+    for geom in np.flatnonzero(owner == WORLD):
+        solid = model.geom_contype[geom] or model.geom_conaffinity[geom]
+        shape = _shape_of(int(model.geom_type[geom]), *model.geom_size[geom])
+        if solid and shape is not None and model.body_weldid[model.geom_bodyid[geom]] == 0:
+            matrix = np.eye(4)
+            matrix[:3, :3], matrix[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+            found.append(Obstacle(shape, Pose.from_matrix(matrix), name=model.body(model.geom_bodyid[geom]).name))
+    return tuple(found)
+
+
+def _shape_of(kind: int, x: float, y: float, z: float) -> Shape | None:
+    """The shape of a geom by MuJoCo's half sizes; None for planes and meshes."""
+    known = mujoco.mjtGeom
+    if kind == known.mjGEOM_BOX:
+        return BoxShape((2.0 * x, 2.0 * y, 2.0 * z))
+    if kind == known.mjGEOM_CYLINDER:
+        return Cylinder(x, 2.0 * y)
+    if kind == known.mjGEOM_SPHERE:
+        return Sphere(x)
+    return Capsule(x, 2.0 * y) if kind == known.mjGEOM_CAPSULE else None

@@ -9,19 +9,10 @@ import numpy as np
 
 from ..planner.chain import FRAME
 from .boxes import Box
-from .scene import ARM, FINGERS, ArmIndex, compiled_scene
-from .state import State, read_arm, read_objects
+from .scene import FIRST_OBJECT, ArmIndex, compiled_scene
+from .state import State, command, read_arms, read_objects
 
 PHYSICS_DT = 0.002
-PAIR_BASE = 100
-
-
-def _pair_codes(owner: np.ndarray) -> np.ndarray:
-    """(ngeom, ngeom) code of the two owners, 0 where their contact does not count."""
-    low = np.minimum(owner[:, None], owner[None, :])
-    high = np.maximum(owner[:, None], owner[None, :])
-    ignored = (low == high) | ((low == ARM) & (high == FINGERS))
-    return np.where(ignored, 0, low * PAIR_BASE + high)
 
 
 class Simulation:
@@ -31,16 +22,22 @@ class Simulation:
         self.scene = compiled_scene(robot, boxes)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
-        self._pair_codes = _pair_codes(self.scene.owner)
         arms, data, model = self.scene.arms, self.data, self.model
         self._widest = [self._measured_opening(arm) for arm in arms]
-        self._offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
-        self._read_index = [np.array([*arm.qpos, *arm.qvel, arm.site, *arm.pads]) for arm in arms]
-        self._home_side = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
-        self._arm_views = (data.qpos, data.qvel, data.site_xmat, data.geom_xpos)
+        self._views = (data.qpos, data.qvel, data.site_xmat, data.geom_xpos)
+        self._ctrl = data.ctrl
+        self._servos = np.array([arm.ctrl for arm in arms])
+        self._grips = np.array([np.column_stack([arm.grip, arm.opened, arm.closed]) for arm in arms])
+        offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
+        sides = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
+        self._homes = np.column_stack([sides, offsets])
+        self._chains = np.array([arm.arm.chain for arm in arms])
         self._frames = np.empty((arms[0].arm.dof, FRAME))
-        self._object_places = model.jnt_qposadr[model.body_jntadr[self.scene.objects]]
-        self._object_dofs = model.body_dofadr[self.scene.objects]
+        self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
+        bodies, owners = self.scene.objects, FIRST_OBJECT + len(boxes)
+        self._object_places = model.jnt_qposadr[model.body_jntadr[bodies]].astype(np.int64)
+        self._object_index = np.column_stack([self._object_places, model.body_dofadr[bodies]])
+        self._touching = np.zeros((owners, owners))
 
     def reset(self, joints: np.ndarray, object_poses: np.ndarray) -> None:
         """Put everything in place, at rest, with open grippers.
@@ -59,14 +56,19 @@ class Simulation:
             self.data.qpos[address : address + 7] = pose
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, speeds: np.ndarray, grips: np.ndarray, substeps: int) -> None:
-        """Hold joint speeds (n_arms, dof) [rad/s] and gripper commands (n_arms,) for some physics steps."""
-        ctrl = self.data.ctrl
-        for arm, speed, grip in zip(self.scene.arms, speeds, grips, strict=True):
-            ctrl[arm.ctrl] = speed
-            if grip != 0.0:
-                ctrl[arm.grip] = arm.closed if grip > 0.0 else arm.opened
-        mujoco.mj_step(self.model, self.data, substeps)
+    def step(self, action: np.ndarray, full: np.ndarray, bound: float, substeps: int) -> int:
+        """Hold an action for some physics steps; -1, or the index of an entry that is not finite, without a step.
+
+        Args:
+            action: (n_arms * (dof + 1),) per arm its joints, then its gripper.
+            full: (n_arms, dof) joint speeds [rad/s] of an entry 1.
+            bound: entries are clipped to plus and minus this.
+            substeps: physics steps.
+        """
+        bad = command(action, full, bound, self._servos, self._grips, self._ctrl)
+        if bad < 0:
+            mujoco.mj_step(self.model, self.data, substeps)
+        return bad
 
     def widest_opening(self, index: int) -> float:
         """Gap between the finger pads of an open gripper [m]."""
@@ -74,30 +76,20 @@ class Simulation:
 
     def read(self) -> State:
         """The state now, in new arrays."""
-        data, count, dof = self.data, len(self.scene.arms), self.scene.arms[0].arm.dof
-        rows = np.empty((count, 2 * dof + 8))
-        for k, arm in enumerate(self.scene.arms):
-            index, home, offset = self._read_index[k], self._home_side[k], self._offsets[k]
-            read_arm(*self._arm_views, arm.arm.chain, self._frames, index, home, offset, rows[k])
-        poses, velocities = np.empty((len(self.scene.objects), 7)), np.empty((len(self.scene.objects), 3))
-        read_objects(data.qpos, data.qvel, self._object_places, self._object_dofs, poses, velocities)
-        tcp = 2 * dof
-        return State(rows[:, :dof], rows[:, dof:tcp], rows[:, tcp : tcp + 7], rows[:, tcp + 7], poses, velocities)
-
-    def contacts(self) -> set[tuple[int, int]]:
-        """Who touches whom: pairs of owners, the smaller first.
-
-        Contacts of a robot with itself and of anything with its own kind are left out.
-        """
-        geoms = self.data.contact.geom
-        codes = set(self._pair_codes[geoms[:, 0], geoms[:, 1]].tolist())
-        codes.discard(0)
-        return {divmod(code, PAIR_BASE) for code in codes}
+        (count, dof), objects = self._servos.shape, len(self._object_index)
+        q, qdot, tcp, opening = np.empty((count, dof)), np.empty((count, dof)), np.empty((count, 7)), np.empty(count)
+        poses, velocities = np.empty((objects, 7)), np.empty((objects, 3))
+        geoms = self.data.contact.geom.copy()  # no view: of one contact it is another type, to be compiled anew
+        qpos, qvel, *frames = self._views
+        read_arms(qpos, qvel, *frames, self._chains, self._frames, self._arm_index, self._homes, q, qdot, tcp, opening)
+        read_objects(qpos, qvel, self._object_index, geoms, self.scene.owner, poses, velocities, self._touching)
+        return State(q, qdot, tcp, opening, poses, velocities, self._touching)
 
     def contact_name(self, pair: tuple[int, int]) -> str:
         """Name of a contact of two owners, as in `link5-block1`."""
         geoms = self.data.contact.geom
-        hit = np.flatnonzero(self._pair_codes[geoms[:, 0], geoms[:, 1]] == pair[0] * PAIR_BASE + pair[1])[0]
+        owners = np.sort(self.scene.owner[geoms], axis=1)
+        hit = np.flatnonzero((owners == pair).all(axis=1))[0]
         return "-".join(sorted(self.scene.labels[geom] for geom in geoms[hit]))
 
     def _pad_distance(self, arm: ArmIndex) -> float:

@@ -1,13 +1,19 @@
-"""The rules of stacking: progress, success, wanted contacts, dense reward, from the simulator's state only."""
+"""The rules of stacking: progress, success, wanted contacts, dense reward, from the simulator's state only.
+
+The numbers are judged in compiled code, see `state`; `StackProgress` keeps what they came to.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..planner.jit import kernel
+from .boxes import TABLE_HEIGHT
 from .scene import ARM, FINGERS, FIRST_OBJECT, WORLD
+from .state import State
 
 BLOCK_SIZE = (0.06, 0.04, 0.05)
 BLOCK = 0.04
@@ -21,105 +27,190 @@ WITHDRAWN = 0.05
 SETTLED_SECONDS = 0.5
 LOST = 0.02
 """A block that was lifted and now stands farther than this from its place was dropped [m]."""
+LOWEST = TABLE_HEIGHT - 0.05
+"""A block whose center is below this has fallen off the table [m]."""
 LIFTED = 0.02
 """Height above its start at which a block counts as lifted [m]."""
 
 
-def yaw_error(pose: list[float], goal: list[float]) -> float:
+FIRST, WAS_LIFTED = 0, 1
+"""Rows of the memory: height of each block at the start, and 1 once it was lifted."""
+
+
+class Verdict(NamedTuple):
+    """What the compiled judge says of a state; counts and flags as whole numbers.
+
+    Attributes:
+        placed: blocks in place, from the lowest on.
+        held: the next block is in the hand.
+        raised: and is lifted.
+        settled: all blocks are in place and at rest, and the hand has withdrawn.
+        lost: a block that was lifted stands elsewhere.
+        fallen: a block is off the table.
+        unwanted: pairs that touch and should not.
+        low: the smaller owner of the last of them, or -1.
+        high: the other owner.
+    """
+
+    placed: int
+    held: int
+    raised: int
+    settled: int
+    lost: int
+    fallen: int
+    unwanted: int
+    low: int
+    high: int
+
+
+@kernel
+def yaw_error(pose, goal):
     """Yaw between two poses (7,) [rad], half turns not counted, in [0, pi / 2]."""
     turn = 2.0 * (math.atan2(pose[6], pose[3]) - math.atan2(goal[6], goal[3])) % math.pi
     return min(turn, math.pi - turn)
 
 
-class StackProgress:
-    """What has happened in an episode so far, renewed from the simulator's state at each step."""
+@kernel
+def allowed_contact(low, high, placed):
+    """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
 
-    def __init__(self, n_blocks: int, dt: float):
-        self.n_blocks = n_blocks
+    Wanted are blocks on the table, a block on the next lower one of the stack, and the fingers on the block that
+    is being fetched, held or was let go last. A robot's contact with itself says nothing.
+    """
+    if low == high or (low == ARM and high == FINGERS):
+        return True
+    if high < FIRST_OBJECT or low == ARM:
+        return False
+    block = high - FIRST_OBJECT
+    if low == WORLD:
+        return True
+    if low == FINGERS:
+        return block == placed or block == placed - 1
+    return block - (low - FIRST_OBJECT) == 1
+
+
+@kernel
+def _distance(a, b):
+    """Of two points (3,) [m]."""
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@kernel
+def judged(poses, velocities, tcp, touching, goals, memory, errors):
+    """Judge a state: the entries of a `Verdict`.
+
+    Args:
+        poses: (n, 7) blocks.
+        velocities: (n, 3) of the blocks [m/s].
+        tcp: (n_arms, 7) the tools.
+        touching: (owners, owners) who touches whom, see `State`.
+        goals: (n, 7) where the blocks must end.
+        memory: (2, n) see FIRST; renewed.
+        errors: (2, n) result: distance in the plane [m] and yaw [rad] of each block to its place.
+    """
+    n, placed, counting, quiet, lost, fallen = len(poses), 0, True, True, False, False
+    for k in range(n):
+        pose, goal = poses[k], goals[k]
+        offset, yaw = math.hypot(pose[0] - goal[0], pose[1] - goal[1]), yaw_error(pose, goal)
+        errors[0, k], errors[1, k] = offset, yaw
+        in_hand = touching[FINGERS, FIRST_OBJECT + k] != 0.0
+        there = offset <= MAX_OFFSET and yaw <= MAX_YAW and abs(pose[2] - goal[2]) <= MAX_HEIGHT
+        in_place = there and not in_hand
+        counting = counting and in_place
+        placed += counting
+        still = math.sqrt(velocities[k, 0] ** 2 + velocities[k, 1] ** 2 + velocities[k, 2] ** 2) < STILL
+        quiet = quiet and still and _distance(pose, tcp[0]) >= WITHDRAWN
+        if in_hand and pose[2] > memory[FIRST, k] + LIFTED:
+            memory[WAS_LIFTED, k] = 1.0
+        lost |= memory[WAS_LIFTED, k] != 0.0 and still and not in_hand and not in_place and offset > LOST
+        fallen |= pose[2] < LOWEST
+    held = placed < n and touching[FINGERS, FIRST_OBJECT + placed] != 0.0
+    raised = held and poses[placed, 2] > memory[FIRST, placed] + LIFTED
+    unwanted, low, high = 0, -1, -1
+    for a in range(len(touching)):
+        for b in range(a, len(touching)):
+            if touching[a, b] != 0.0 and not allowed_contact(a, b, placed):
+                unwanted, low, high = unwanted + 1, a, b
+    return placed, int(held), int(raised), int(placed == n and quiet), int(lost), int(fallen), unwanted, low, high
+
+
+@kernel
+def shaped(poses, goals, tcp, placed, held):
+    """Dense reward in [0, 1]: the share of blocks placed, and of the current one reached, grasped and carried."""
+    n = len(poses)
+    if placed == n:
+        return 1.0
+    reach = 1.0 - math.tanh(5.0 * _distance(poses[placed], tcp[0]))
+    carry = 1.0 - math.tanh(5.0 * _distance(poses[placed], goals[placed]))
+    part = 0.3 * reach + (0.1 + 0.5 * carry if held else 0.0)
+    return (placed + part) / n
+
+
+class StackProgress:
+    """What has happened in an episode so far, renewed from the simulator's state at each step.
+
+    Args:
+        goals: (n, 7) where the blocks must end.
+        start: (n, 7) where they are at the start.
+        dt: seconds between states.
+    """
+
+    def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float):
+        self.n_blocks = len(goals)
+        self._goals = goals
         self._needed = round(SETTLED_SECONDS / dt)
         self._settled_steps = 0
-        self._start_height: list[float] | None = None
+        self._memory = np.stack([start[:, 2], np.zeros(self.n_blocks)])
+        self._errors = np.zeros((2, self.n_blocks))
+        self._best_stage = 0
+        self._stages = [stage_name(best, self.n_blocks) for best in range(2 * self.n_blocks + 1)]
         self.placed = 0
         self.held = False
-        self._lifted = [False] * n_blocks
-        self._best_stage = 0
         self.collisions = 0
         self.collision = ""
         self.failure = ""
-        self.offset = [0.0] * n_blocks
-        self.yaw = [0.0] * n_blocks
-
-    @property
-    def current(self) -> int:
-        """The block that is to be moved, the last one when all are placed."""
-        return min(self.placed, self.n_blocks - 1)
 
     @property
     def motion_index(self) -> float:
         """2k while block k is to be fetched, 2k + 1 while it is held."""
-        return float(2 * self.placed + (1 if self.held else 0))
+        return float(2 * self.placed + self.held)
 
     @property
     def success(self) -> bool:
         """All blocks have been in place, at rest and let go for long enough."""
         return self._settled_steps >= self._needed
 
-    def update(
-        self,
-        poses: list[list[float]],
-        goals: list[list[float]],
-        tcp: list[float],
-        touching: set[tuple[int, int]],
-        velocities: list[list[float]],
-    ) -> None:
-        """Take in a new state; plain numbers, since this runs at every step and the lists are short.
+    def update(self, state: State) -> Verdict:
+        """Take in a new state."""
+        self._errors = np.empty((2, self.n_blocks))
+        poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
+        verdict = Verdict(*judged(poses, moving, tcp, state.touching, self._goals, self._memory, self._errors))
+        self.placed, self.held = verdict.placed, verdict.held == 1
+        self._settled_steps = self._settled_steps + 1 if verdict.settled else 0
+        self._best_stage = max(self._best_stage, 2 * verdict.placed + verdict.raised)
+        self.collisions += verdict.unwanted
+        self.failure = "off_table" if verdict.fallen else "dropped" if verdict.lost else ""
+        return verdict
 
-        Args:
-            poses: (n, 7) blocks.
-            goals: (n, 7) their goals.
-            tcp: (3,) the tcp [m].
-            touching: who touches whom, see `Simulation.contacts`.
-            velocities: (n, 3) of the blocks [m/s].
-        """
-        if self._start_height is None:
-            self._start_height = [pose[2] for pose in poses]
-        placed, counting, all_still, all_clear, lost = 0, True, True, True, False
-        for k, (pose, goal, velocity) in enumerate(zip(poses, goals, velocities, strict=True)):
-            self.offset[k] = math.hypot(pose[0] - goal[0], pose[1] - goal[1])
-            self.yaw[k] = yaw_error(pose, goal)
-            in_hand = (FINGERS, FIRST_OBJECT + k) in touching
-            there = self.offset[k] <= MAX_OFFSET and self.yaw[k] <= MAX_YAW
-            in_place = there and abs(pose[2] - goal[2]) <= MAX_HEIGHT and not in_hand
-            counting = counting and in_place
-            placed += counting
-            still = math.hypot(*velocity) < STILL
-            all_still = all_still and still
-            all_clear = all_clear and math.dist(pose[:3], tcp) >= WITHDRAWN
-            raised = pose[2] > self._start_height[k] + LIFTED
-            self._lifted[k] |= raised and in_hand
-            lost |= self._lifted[k] and still and not in_hand and not in_place and self.offset[k] > LOST
-        self.placed = placed
-        self.held = placed < self.n_blocks and (FINGERS, FIRST_OBJECT + placed) in touching
-        settled = placed == self.n_blocks and all_still and all_clear
-        self._settled_steps = self._settled_steps + 1 if settled else 0
-        raised = self.held and poses[placed][2] > self._start_height[placed] + LIFTED
-        self._best_stage = max(self._best_stage, 2 * placed + int(raised))
-        self.failure = "dropped" if lost else ""
+    def reward(self, state: State) -> float:
+        """The dense reward of the state taken in last."""
+        return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
     def info(self) -> dict[str, Any]:
         """The entries of `info`."""
+        success = self.success
         return {
-            "is_success": self.success,
-            "success": self.success,
+            "is_success": success,
+            "success": success,
             "safe": self.collisions == 0,
-            "stage": stage_name(self._best_stage, self.n_blocks),
+            "stage": self._stages[self._best_stage],
             "failure_reason": self.failure,
             "collision": self.collision,
             "n_contacts": self.collisions,
-            "min_obstacle_distance": float("inf"),
+            "min_obstacle_distance": math.inf,
             "blocks_placed": self.placed,
-            "position_error": np.array(self.offset),
-            "yaw_error": np.array(self.yaw),
+            "position_error": self._errors[0],
+            "yaw_error": self._errors[1],
         }
 
 
@@ -130,31 +221,3 @@ def stage_name(best: int, n_blocks: int) -> str:
     if best % 2:
         return f"lifted block {best // 2 + 1} of {n_blocks}"
     return f"placed {best // 2} of {n_blocks}"
-
-
-def allowed_contact(pair: tuple[int, int], progress: StackProgress) -> bool:
-    """Whether two owners may touch: see WORLD in `sim` for their numbers, the smaller first.
-
-    Wanted are blocks on the table, a block on the next lower one of the stack, and the fingers on the block that
-    is being fetched, held or was let go last.
-    """
-    low, high = pair
-    if high < FIRST_OBJECT or low == ARM:
-        return False
-    block = high - FIRST_OBJECT
-    if low == WORLD:
-        return True
-    if low == FINGERS:
-        return block in (progress.placed, progress.placed - 1)
-    return block - (low - FIRST_OBJECT) == 1
-
-
-def shaped(poses: list[list[float]], goals: list[list[float]], tcp: list[float], progress: StackProgress) -> float:
-    """Dense reward in [0, 1]: the share of blocks placed, and of the current one reached, grasped and carried."""
-    if progress.placed == progress.n_blocks:
-        return 1.0
-    k = progress.current
-    reach = 1.0 - math.tanh(5.0 * math.dist(poses[k][:3], tcp))
-    carry = 1.0 - math.tanh(5.0 * math.dist(poses[k][:3], goals[k][:3]))
-    part = 0.3 * reach + (0.1 + 0.5 * carry if progress.held else 0.0)
-    return (progress.placed + part) / progress.n_blocks

@@ -8,11 +8,12 @@ import numpy as np
 
 from ..planner.errors import BadOption, UnknownName
 from .base import OneDemoEnv
+from .bodies import robot_body
 from .boxes import TABLE_HEIGHT, Box
 from .layouts import TABLE_EDGE, Layout, level_named, stack_layout
 from .options import checked_joints, checked_poses
 from .spaces import observation_space
-from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress, allowed_contact, shaped
+from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress
 from .state import State
 from .task import TaskDescription, TaskObject
 
@@ -110,12 +111,13 @@ class StackEnv(OneDemoEnv):
             arms=self.arms,
             control_dt=self.control_dt,
             objects=tuple(TaskObject(box.name, np.array(box.size), np.pi) for box in boxes),
+            bodies=tuple(robot_body(robot, k) for k in range(len(self.arms))),
             table_height=TABLE_HEIGHT,
+            fixtures=self.sim.scene.fixtures,
             gripper_width=widths,
         )
         self._goal_pose = np.zeros((n_blocks, 7))
-        self._goal_lists = self._goal_pose.tolist()
-        self._progress = StackProgress(n_blocks, self.control_dt)
+        self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
 
     @property
     def task(self) -> TaskDescription:
@@ -141,28 +143,19 @@ class StackEnv(OneDemoEnv):
             joints = checked_joints(options["joint_positions"], self.arms)
         self._goal_pose = np.repeat(base[None], self.n_blocks, axis=0)
         self._goal_pose[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
-        self._goal_lists = self._goal_pose.tolist()
-        self._progress = StackProgress(self.n_blocks, self.control_dt)
+        self._progress = StackProgress(self._goal_pose, poses, self.control_dt)
         return joints, poses
 
     def _goals(self) -> tuple[np.ndarray, float]:
         return self._goal_pose.copy(), self._progress.motion_index
 
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress, touching = self._progress, self.sim.contacts()
-        poses, goals, tcp = state.object_pose.tolist(), self._goal_lists, state.tcp_pose[0, :3].tolist()
-        progress.update(poses, goals, tcp, touching, state.object_velocity.tolist())
-        for pair in touching:
-            if not allowed_contact(pair, progress):
-                progress.collisions += 1
-                progress.collision = self.sim.contact_name(pair)
-        fallen = min(pose[2] for pose in poses) < TABLE_HEIGHT - 0.05
-        if fallen:
-            progress.failure = "off_table"
-        reward = float(progress.success)
-        if self.reward_kind == "dense":
-            reward = shaped(poses, goals, tcp, progress)
-        return reward, progress.success or fallen, progress.info()
+        progress = self._progress
+        verdict = progress.update(state)
+        if verdict.unwanted:
+            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
+        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
+        return reward, progress.success or verdict.fallen == 1, progress.info()
 
 
 def _poses(layout: Layout) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,12 @@
-"""What is read of a simulation after each step, in one compiled pass: this runs fifty times per simulated second."""
+"""What goes into a simulation and what is read from it at each step, compiled: it runs fifty times per second.
+
+After `mj_step` the processor's caches hold the physics and nothing else, so that every small array and every call
+costs five times what it costs in a loop. Hence one pass each way, and few arrays.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +17,7 @@ from ..planner.screw import translation
 
 
 class State(NamedTuple):
-    """The measured state; the arrays are new at each reading.
+    """The measured state; the arrays are new at each reading, but for `touching`.
 
     Attributes:
         joint_positions: (n_arms, dof) [rad].
@@ -21,6 +26,7 @@ class State(NamedTuple):
         gripper_opening: (n_arms,) gap between the finger pads [m].
         object_pose: (n_objects, 7) x y z [m] and wxyz with w >= 0.
         object_velocity: (n_objects, 3) [m/s].
+        touching: (owners, owners) 1 where two owners touch, the smaller first; renewed in place.
     """
 
     joint_positions: np.ndarray
@@ -29,6 +35,34 @@ class State(NamedTuple):
     gripper_opening: np.ndarray
     object_pose: np.ndarray
     object_velocity: np.ndarray
+    touching: np.ndarray
+
+
+@kernel
+def command(action, full, bound, servos, grips, ctrl):
+    """Write an action into `ctrl`; index of its first entry that is not finite, then nothing is written, or -1.
+
+    Args:
+        action: (n_arms * (dof + 1),) per arm its joints, then its gripper: above 0 closes, below 0 opens.
+        full: (n_arms, dof) joint speeds [rad/s] of an entry 1.
+        bound: entries are clipped to plus and minus this.
+        servos: (n_arms, dof) places of the joint speeds in `ctrl`.
+        grips: (n_arms, fingers, 3) per finger its place in `ctrl` and its controls when open and when closed.
+        ctrl: MuJoCo's controls.
+    """
+    for k in range(len(action)):
+        if not math.isfinite(action[k]):
+            return k
+    arms, dof = servos.shape
+    for i in range(arms):
+        first = i * (dof + 1)
+        for j in range(dof):
+            ctrl[servos[i, j]] = min(max(action[first + j], -bound), bound) * full[i, j]
+        grip = action[first + dof]
+        if grip != 0.0:
+            for finger in range(grips.shape[1]):
+                ctrl[int(grips[i, finger, 0])] = grips[i, finger, 2 if grip > 0.0 else 1]
+    return -1
 
 
 @kernel
@@ -43,38 +77,55 @@ def _face(quaternion, reference):
 
 
 @kernel
-def read_arm(qpos, qvel, site_xmat, geom_xpos, chain, frames, index, home, offset, out):
-    """One arm into `out` (2 dof + 8,): joints, speeds, tcp pose, opening.
+def read_arms(qpos, qvel, site_xmat, geom_xpos, chains, frames, index, homes, q, qdot, tcp, opening):
+    """All arms: joints (n, dof), their speeds (n, dof), tcp poses (n, 7) and finger gaps (n,).
 
     The tcp is the forward kinematics of these joints: MuJoCo's own frames are one physics step older than its
-    positions. `index` (2 dof + 3,) holds the addresses of positions and speeds, the site and the two pads; `home`
-    (4,) the quaternion whose side the tcp's is given; `offset` [m] turns the distance of the pads into their gap.
+    positions. `index` (n, 2 dof + 3) holds the addresses of positions and speeds, the site and the two pads; `homes`
+    (n, 5) the quaternion whose side the tcp's is given, and what [m] turns the distance of the pads into their gap.
     """
-    dof = (len(index) - 3) // 2
-    for j in range(dof):
-        out[j] = qpos[index[j]]
-        out[dof + j] = qvel[index[dof + j]]
-    x = forward(chain, out[:dof], frames)
-    place, tcp = translation(x), 2 * dof
-    site, left, right = index[2 * dof], index[2 * dof + 1], index[2 * dof + 2]
-    gap = 0.0
-    for k in range(3):
-        out[tcp + k] = place[k]
-        # the fingers close along the x axis of the tcp
-        gap += (geom_xpos[left, k] - geom_xpos[right, k]) * site_xmat[site, 3 * k]
-    for k in range(4):
-        out[tcp + 3 + k] = x[k]
-    _face(out[tcp + 3 : tcp + 7], home)
-    out[tcp + 7] = max(0.0, abs(gap) + offset)
+    arms, dof = q.shape
+    for i in range(arms):
+        for j in range(dof):
+            q[i, j] = qpos[index[i, j]]
+            qdot[i, j] = qvel[index[i, dof + j]]
+        x = forward(chains[i], q[i], frames)
+        place = translation(x)
+        site, left, right = index[i, 2 * dof], index[i, 2 * dof + 1], index[i, 2 * dof + 2]
+        gap = 0.0
+        for k in range(3):
+            tcp[i, k] = place[k]
+            # the fingers close along the x axis of the tcp
+            gap += (geom_xpos[left, k] - geom_xpos[right, k]) * site_xmat[site, 3 * k]
+        for k in range(4):
+            tcp[i, 3 + k] = x[k]
+        _face(tcp[i, 3:7], homes[i])
+        opening[i] = max(0.0, abs(gap) + homes[i, 4])
 
 
 @kernel
-def read_objects(qpos, qvel, places, dofs, poses, velocities):
-    """All free bodies: poses (n, 7) with w >= 0 and linear velocities (n, 3), at these addresses."""
-    for i in range(len(places)):
-        sign = -1.0 if qpos[places[i] + 3] < 0.0 else 1.0
+def read_objects(qpos, qvel, index, geoms, owner, poses, velocities, touching):
+    """All free bodies: poses (n, 7) with w >= 0, linear velocities (n, 3); who `touching` (owners, owners) whom.
+
+    Args:
+        qpos: MuJoCo's positions.
+        qvel: MuJoCo's speeds.
+        index: (n, 2) addresses of positions and of speeds.
+        geoms: (contacts, 2 or more) the two geoms of each contact.
+        owner: (ngeom,) whose geom it is.
+        poses: result.
+        velocities: result.
+        touching: result; the smaller owner first.
+    """
+    for i in range(len(index)):
+        place, dof = index[i, 0], index[i, 1]
+        sign = -1.0 if qpos[place + 3] < 0.0 else 1.0
         for k in range(3):
-            poses[i, k] = qpos[places[i] + k]
-            velocities[i, k] = qvel[dofs[i] + k]
+            poses[i, k] = qpos[place + k]
+            velocities[i, k] = qvel[dof + k]
         for k in range(4):
-            poses[i, 3 + k] = sign * qpos[places[i] + 3 + k]
+            poses[i, 3 + k] = sign * qpos[place + 3 + k]
+    touching[:] = 0.0
+    for i in range(len(geoms)):
+        a, b = owner[geoms[i, 0]], owner[geoms[i, 1]]
+        touching[min(a, b), max(a, b)] = 1.0

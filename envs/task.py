@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..planner.arm import Arm
+from ..planner.body import Body
+from ..planner.shapes import Obstacle
 
 FAILURES = (
     "ik_or_limit",
@@ -56,7 +58,9 @@ class TaskDescription:
         arms: one kinematic chain per arm, in the order of the observation; world frame as observed.
         control_dt: seconds between actions.
         objects: in the order of `object_pose`.
+        bodies: per arm the capsules that contain it, gripper included; see `planner.body`.
         table_height: z of the table top [m].
+        fixtures: what stands still for ever: the table (named "table"), the robot's stand; no floor.
         gripper_width: largest distance between the finger pads [m], one per arm.
     """
 
@@ -65,5 +69,7 @@ class TaskDescription:
     arms: tuple[Arm, ...]
     control_dt: float
     objects: tuple[TaskObject, ...]
+    bodies: tuple[Body, ...]
     table_height: float
+    fixtures: tuple[Obstacle, ...]
     gripper_width: tuple[float, ...]

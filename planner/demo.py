@@ -13,8 +13,17 @@ from .segment import dwells
 
 SOURCES = ("teleoperated", "kinesthetic", "scripted")
 GRIPPER_ACTIONS = ("close", "open", "none")
-ROBOTS = ("Panda", "Sawyer", "Baxter", "IIWA", "UR5e", "Kinova3", "Jaco", "XArm7")
-"""Robots that a demonstration may come from."""
+ROBOTS = {
+    "Panda": (7,),
+    "Sawyer": (7,),
+    "Baxter": (7, 14),
+    "IIWA": (7,),
+    "UR5e": (6,),
+    "Kinova3": (7,),
+    "Jaco": (7,),
+    "XArm7": (7,),
+}
+"""Robots that a demonstration may come from, with how many joints are recorded: Baxter's of one arm or of both."""
 FARTHEST = 10.0
 """Positions beyond this [m] are in another unit than metres."""
 
@@ -89,6 +98,10 @@ class Demonstration:
             value = getattr(self, key)
             if value is not None:
                 object.__setattr__(self, key, self._checked(key, value, count, width))
+        joints = self.joint_positions
+        if joints is not None and joints.shape[1] not in ROBOTS[self.robot]:
+            allowed = " or ".join(str(number) for number in ROBOTS[self.robot])
+            raise self._bad("joint_positions", f"has {joints.shape[1]} columns; the {self.robot} has {allowed} joints")
         steps = np.diff(self.time)
         if (steps <= 0).any():
             raise self._bad("time", f"does not increase at index {int(np.argmax(steps <= 0)) + 1}")
@@ -96,6 +109,7 @@ class Demonstration:
         if farthest.max() > FARTHEST:
             index = int(farthest.argmax())
             raise self._bad("path", f"sample {index} is {farthest[index]:.4g} m away; are the positions in cm or mm?")
+        object.__setattr__(self, "object_sizes", self._checked_sizes())
         self._check_segments(count)
 
     def _check_segments(self, count: int) -> None:
@@ -113,9 +127,35 @@ class Demonstration:
             if segment.gripper not in GRIPPER_ACTIONS:
                 raise self._bad(key, f"gripper {segment.gripper!r} is not one of {', '.join(GRIPPER_ACTIONS)}")
             before = segment.stop
+            self._check_objects(key, segment)
+
+    def _check_objects(self, key: str, segment: Segment) -> None:
+        """The objects that a segment names must be known, where any are, and not in another unit."""
+        known = ("", *self.object_sizes)
+        for role in ("reference", "held"):
+            if self.object_sizes and getattr(segment, role) not in known:
+                allowed = ", ".join(self.object_sizes)
+                raise self._bad(
+                    key, f"{role} {getattr(segment, role)!r} is not in object_names; allowed: {allowed}, ''"
+                )
+        farthest = float(np.abs(segment.reference_pose.position).max())
+        if farthest > FARTHEST:
+            raise self._bad(key, f"the reference pose is {farthest:.4g} m away; is it in cm or mm?")
+
+    def _checked_sizes(self) -> dict[str, np.ndarray]:
+        sizes = {}
+        for name, value in self.object_sizes.items():
+            size = self._numbers("object_sizes", value)
+            if size.shape != (3,):
+                raise self._bad("object_sizes", f"of {name!r} has shape {size.shape}; expected (3,) [m]")
+            if not (np.isfinite(size).all() and size.min() > 0.0):
+                raise self._bad("object_sizes", f"of {name!r} is {size.tolist()}; expected three positive numbers [m]")
+            size.flags.writeable = False
+            sizes[name] = size
+        return sizes
 
     def _checked(self, key: str, value: Any, count: int, dimensions: int) -> np.ndarray:
-        array = np.array(value, dtype=np.float64)
+        array = self._numbers(key, value)
         if array.ndim != dimensions or len(array) != count:
             expected = f"({count},)" if dimensions == 1 else f"({count}, joints)"
             raise self._bad(key, f"has shape {array.shape}; expected {expected}")
@@ -124,6 +164,13 @@ class Demonstration:
             raise self._bad(key, f"is not finite at index {int(bad[0][0])}")
         array.flags.writeable = False
         return array
+
+    def _numbers(self, key: str, value: Any) -> np.ndarray:
+        """A float64 copy of real numbers."""
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu":
+            raise self._bad(key, f"is not an array of real numbers, but of {array.dtype.name}")
+        return array.astype(np.float64)
 
     def _bad(self, key: str, reason: str) -> BadDemonstration:
         return BadDemonstration(self.name, key, reason)

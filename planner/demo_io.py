@@ -38,7 +38,7 @@ OPTIONAL = (
 
 
 def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
-    """Write a demonstration to an .npz file."""
+    """Write a demonstration to an .npz file, which appears when it is complete."""
     demo, segments = demonstration, demonstration.segments
     arrays: dict[str, Any] = {
         "format_version": FORMAT_VERSION,
@@ -59,8 +59,14 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
         if getattr(demo, key) is not None:
             arrays[key] = getattr(demo, key)
     texts = {key: np.array(value, dtype=str) for key, value in arrays.items() if _is_text(value)}
-    with Path(path).open("wb") as file:
-        np.savez_compressed(file, **{**arrays, **texts})
+    path = Path(path)
+    part = path.with_name(f"{path.name}.part")
+    try:
+        with part.open("wb") as file:
+            np.savez_compressed(file, **{**arrays, **texts})
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def load_demonstration(path: str | Path) -> Demonstration:
@@ -86,10 +92,12 @@ def load_demonstration(path: str | Path) -> Demonstration:
     try:
         return Demonstration(
             **texts,
-            time=_numbers(path, "time", arrays["time"], 1),
+            time=numbers(path, "time", arrays["time"], 1),
             path=PosePath.from_vectors(unit_poses(path, "poses", arrays["poses"])),
-            joint_positions=arrays.get("joint_positions"),
-            gripper=arrays.get("gripper"),
+            joint_positions=numbers(path, "joint_positions", arrays["joint_positions"], 2)
+            if "joint_positions" in arrays
+            else None,
+            gripper=numbers(path, "gripper", arrays["gripper"], 1) if "gripper" in arrays else None,
             segments=_segments(path, arrays),
             object_sizes=_object_sizes(path, arrays),
         )
@@ -137,7 +145,7 @@ def _announced_bytes(path: Path, archive: zipfile.ZipFile, name: str) -> int:
 
 def unit_poses(path: Path | str, key: str, value: np.ndarray) -> np.ndarray:
     """Pose vectors (n, 7) with quaternions normalized, if they are unit up to rounding."""
-    poses = _numbers(path, key, value, 2)
+    poses = numbers(path, key, value, 2)
     if poses.shape[1] != 7:
         raise BadDemonstration(path, key, f"has shape {poses.shape}; expected (n, 7): x y z [m], quaternion wxyz")
     norms = np.linalg.norm(poses[:, 3:], axis=1)
@@ -157,7 +165,18 @@ def _text(path: Path, key: str, value: np.ndarray) -> str:
     return str(value)
 
 
-def _numbers(path: Path | str, key: str, value: np.ndarray, dimensions: int) -> np.ndarray:
+def _texts(path: Path, key: str, value: np.ndarray) -> list[str]:
+    if value.ndim != 1 or value.dtype.kind != "U":
+        raise BadDemonstration(path, key, "is not a list of texts")
+    return [str(text) for text in value]
+
+
+def numbers(path: Path | str, key: str, value: np.ndarray, dimensions: int) -> np.ndarray:
+    """The array as float64, if it holds finite real numbers and has that many dimensions.
+
+    Raises:
+        BadDemonstration: naming the file, the key and the index.
+    """
     if value.dtype.kind not in "fiu" or value.ndim != dimensions:
         raise BadDemonstration(path, key, f"is not an array of numbers with {dimensions} dimension(s)")
     array = value.astype(np.float64)
@@ -175,28 +194,35 @@ def _segments(path: Path, arrays: dict[str, np.ndarray]) -> tuple[Segment, ...]:
     missing = [key for key in keys if key not in arrays]
     if missing:
         raise BadDemonstration(path, missing[0], "is missing, although other segment entries are there")
-    count = len(arrays["segment_names"])
-    for key in keys:
-        if arrays[key].ndim == 0 or len(arrays[key]) != count:
-            raise BadDemonstration(path, key, f"does not have {count} entries as segment_names has")
+    keys = ("segment_names", "segment_references", "segment_held", "segment_gripper")
+    names, references, held, gripper = (_texts(path, key, arrays[key]) for key in keys)
+    ranges = arrays["segment_ranges"]
+    if ranges.dtype.kind not in "iu" or ranges.ndim != 2 or ranges.shape[1] != 2:
+        reason = f"is {ranges.dtype.name} of shape {ranges.shape}; expected whole numbers (segments, 2)"
+        raise BadDemonstration(path, "segment_ranges", reason)
     poses = unit_poses(path, "segment_reference_poses", arrays["segment_reference_poses"])
+    for key in present:
+        if len(arrays[key]) != len(names):
+            raise BadDemonstration(path, key, f"does not have {len(names)} entries as segment_names has")
     return tuple(
         Segment(
-            name=str(arrays["segment_names"][k]),
-            start=int(arrays["segment_ranges"][k][0]),
-            stop=int(arrays["segment_ranges"][k][1]),
-            reference=str(arrays["segment_references"][k]),
+            name=names[k],
+            start=int(ranges[k, 0]),
+            stop=int(ranges[k, 1]),
+            reference=references[k],
             reference_pose=Pose.from_vector(poses[k]),
-            held=str(arrays["segment_held"][k]),
-            gripper=str(arrays["segment_gripper"][k]),
+            held=held[k],
+            gripper=gripper[k],
         )
-        for k in range(count)
+        for k in range(len(names))
     )
 
 
 def _object_sizes(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    names = arrays.get("object_names", np.empty(0, dtype=str))
-    sizes = _numbers(path, "object_sizes", arrays.get("object_sizes", np.empty((0, 3))), 2)
+    names = _texts(path, "object_names", arrays.get("object_names", np.empty(0, dtype=str)))
+    if len(set(names)) < len(names) or "" in names:
+        raise BadDemonstration(path, "object_names", f"are not unique names: {', '.join(map(repr, names))}")
+    sizes = numbers(path, "object_sizes", arrays.get("object_sizes", np.empty((0, 3))), 2)
     if sizes.shape != (len(names), 3):
         raise BadDemonstration(path, "object_sizes", f"has shape {sizes.shape}; expected ({len(names)}, 3)")
-    return {str(name): size for name, size in zip(names, sizes, strict=True)}
+    return dict(zip(names, sizes, strict=True))

@@ -34,6 +34,7 @@ class JointSearchSettings:
         seeds: starts of the inverse kinematics per pose.
         targets: poses of the demonstrated path's tail that are aimed at, from the guiding pose to the goal.
         postures: most postures that are searched for, the most promising first.
+        rounds: how often, each time with twice as many seeds.
         margin: smallest joint margin [rad] that a posture should have, so that the next leg has somewhere to go.
         shortcuts: tries to leave out points of what was found.
         speed: of the largest joint speed, on the way found.
@@ -45,15 +46,16 @@ class JointSearchSettings:
     seeds: int = 12
     targets: int = 3
     postures: int = 4
+    rounds: int = 3
     margin: float = 0.15
-    shortcuts: int = 150
+    shortcuts: int = 60
     speed: float = 0.4
 
     def __post_init__(self):
         for name in ("step", "speed"):
             if not 0 < getattr(self, name) <= 10:
                 raise BadOption(name, f"{getattr(self, name)} is not a positive number up to 10")
-        for name in ("iterations", "nodes", "seeds", "targets", "postures"):
+        for name in ("iterations", "nodes", "seeds", "targets", "postures", "rounds"):
             if not 1 <= getattr(self, name) <= 10**6:
                 raise BadOption(name, f"{getattr(self, name)} is not from 1 to a million")
 
@@ -110,17 +112,20 @@ def joint_leg(
     state = np.array([float(seed % 2147483646) + 1.0])
     trees, parents = np.empty((2, search.nodes, arm.dof)), np.empty((2, search.nodes))
     out = np.empty((2 * search.nodes, arm.dof))
-    for posture in sorted(_postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng))[: search.postures]:
-        count = connect(scene.robot, q, posture.q, trees, parents, search.step, search.iterations, state, out)
-        if count:
-            count = shortcut(scene.robot, out, count, search.shortcuts, state)
-            way = _timed(out[:count], search.speed * arm.velocity_limits * settings.motion.dt)
-            joints = np.vstack([way[:-1], posture.tail])
-            return JointLeg(joints, posture.path, min(arm.margin(row) for row in joints))
+    for turn in range(search.rounds):
+        seeds = search.seeds * 2**turn
+        found = _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, seeds)
+        for posture in sorted(found)[: search.postures]:
+            count = connect(scene.robot, q, posture.q, trees, parents, search.step, search.iterations, state, out)
+            if count:
+                count = shortcut(scene.robot, out, count, search.shortcuts, state)
+                way = _timed(out[:count], search.speed * arm.velocity_limits * settings.motion.dt)
+                joints = np.vstack([way[:-1], posture.tail])
+                return JointLeg(joints, posture.path, min(arm.margin(row) for row in joints))
     return None
 
 
-def _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng) -> list[_Posture]:
+def _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, seeds) -> list[_Posture]:
     """Clear postures on the demonstrated path from which the rest of it can be followed, with what they cost."""
     search, found = settings.search, []
     imitated = imitated_path(demonstrated, goal)
@@ -128,9 +133,9 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng) ->
     home = np.clip(q, np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi))
     for index in sorted({round(i) for i in np.linspace(first, last, search.targets)}):
         path = imitated[index:]
-        for k in range(search.seeds):
+        for k in range(seeds):
             low, high = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
-            guess = home if k == 0 else rng.uniform(low, high)
+            guess = home if k == 0 and seeds == search.seeds else rng.uniform(low, high)
             solution = inverse_kinematics(arm, path[0], guess, iterations=150)
             if solution is None or scene.room(solution) < 0.0:
                 continue

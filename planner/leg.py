@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import screw
-from .escape import ESCAPED, FREE, escape, write_edge
+from .escape import ESCAPED, escape, write_edge
 from .escape_tree import tree_arrays
 from .guarded import guarded_roll_out
 from .jit import inner, kernel
@@ -43,22 +43,24 @@ class Buffers(NamedTuple):
 
 def buffers(settings: RepetSettings, dof: int, ticks: int) -> Buffers:
     """Arrays for legs of an arm with so many joints and at most so many ticks."""
-    paths = (np.zeros((settings.longest, 8)) for _ in range(4))
     tree, cells, heap = tree_arrays(settings.nodes, settings.levels)
     return Buffers(
-        *paths,
-        np.zeros(settings.longest),
-        np.zeros(settings.candidates),
-        np.zeros((settings.candidates, 8)),
-        np.zeros((settings.levels + 3, 8)),
-        tree,
-        cells,
-        heap,
-        settings.packed(),
-        np.ones(1),
-        np.zeros((settings.rounds, 4)),
-        np.zeros((ticks + 1, dof)),
-        np.zeros(8, dtype=np.int64),
+        imitated=np.zeros((settings.longest, 8)),
+        path=np.zeros((settings.longest, 8)),
+        followed=np.zeros((settings.longest, 8)),
+        spare=np.zeros((settings.longest, 8)),
+        rooms=np.zeros(settings.longest),
+        places=np.zeros(settings.candidates),
+        poses=np.zeros((settings.candidates, 8)),
+        branch=np.zeros((settings.levels + 3, 8)),
+        tree=tree,
+        cells=cells,
+        heap=heap,
+        options=settings.packed(),
+        state=np.ones(1),
+        log=np.zeros((settings.rounds, 4)),
+        trace=np.zeros((ticks + 1, dof)),
+        counts=np.zeros(8, dtype=np.int64),
     )
 
 
@@ -152,6 +154,3 @@ def leg(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, memory, wi
     )
     counts[LAST], counts[CHANGED] = last, changed
     return status, pursuit, margin
-
-
-__all__ = ["ESCAPED", "FREE", "Buffers", "buffers", "leg"]

@@ -22,19 +22,17 @@ from .body import Body
 from .errors import BadOption
 from .escape import ESCAPED, FREE
 from .joint_leg import JointSearchSettings, joint_leg
-from .leg import CHANGED, DETOURS, FOLLOWED, FULL, GUIDE, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
+from .leg import CHANGED, DETOURS, FOLLOWED, FULL, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
 from .motions import MotionSettings
 from .pose import Pose, PosePath
 from .pursuit import ARRIVED
-from .repet import REASONS, EscapeTree, RepetSettings
+from .repet import REASONS, Corner, EscapeTree, RepetSettings
 from .safety import SafetySettings
 from .scene_work import SceneWork, checked_obstacles
 from .shapes import Obstacle
 from .workspace import bound
 
-Corner = tuple[float, float, float]
-BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.5, 0.0),
-                              (0.0, -0.5, 0.0))  # fmt: skip
+BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,23 +168,21 @@ class Planner:
         if reason:
             return self._failed(reason, q, demonstrated, begun)
         lead = (leaving.dqs if leaving is not None else self.arm.fk(q).dq[None]).copy()
-        best, tries = "", 0
-        for fraction, bias, factor in self._attempts():
-            tries += 1
+        best, escapes = "", []
+        for fraction, bias, factor in self._attempts(escapes):
             status, pursuit, margin = self._leg(scene, demonstrated, goal, lead, q, fraction, bias, factor, seed)
+            escapes.append(status)
             if pursuit == ARRIVED and status in (FREE, ESCAPED):
                 how = "escape" if status == ESCAPED else "direct"
-                return self._plan(how, margin, tries, begun)
+                return self._plan(how, margin, len(escapes), begun)
             best = best or REASONS.get(status, "") or "ik_or_limit"
-            if not len(obstacles) and fraction == self.settings.motion.max_guide:
-                break
         found = None
         if self.settings.search is not None and self.settings.avoid:
             found = joint_leg(self.arm, scene, self._work, demonstrated, goal, q, self.settings, onward, seed)
         if found is None:
-            return self._failed(best, q, demonstrated, begun, tries)
+            return self._failed(best, q, demonstrated, begun, len(escapes))
         self._buffers.counts[DETOURS] = self._buffers.counts[TREE_ROWS] = 0
-        plan = self._plan("joint search", found.margin, tries, begun)
+        plan = self._plan("joint search", found.margin, len(escapes), begun)
         return plan._replace(joints=found.joints, path=found.path)
 
     def _unfit(self, scene: SceneWork, q: np.ndarray, goal: Pose) -> str:
@@ -198,16 +194,23 @@ class Planner:
             return "goal in collision"
         return ""
 
-    def _attempts(self) -> Iterator[tuple[float, Corner, float]]:
-        """Guide, bias and margin factor of each closed loop that is tried, the likeliest first."""
-        guides = (self.settings.motion.guide, self.settings.motion.max_guide)
-        biases = self.settings.biases if self.settings.avoid else self.settings.biases[:1]
-        yield guides[0], biases[0], 1.0
-        yield guides[1], biases[0], 1.0
-        for bias in biases:
-            yield guides[0], bias, self.settings.tight
-        for bias in biases[1:]:
-            yield guides[1], bias, self.settings.tight
+    def _attempts(self, escapes: list[int]) -> Iterator[tuple[float, Corner, float]]:
+        """Guide, bias and margin factor of each closed loop that is tried, the likeliest first.
+
+        Args:
+            escapes: statuses of the tries so far: biases help where the arm could not follow a detour, not where
+                there is none.
+        """
+        settings, (guide, later) = self.settings, (self.settings.motion.guide, self.settings.motion.max_guide)
+        yield guide, settings.biases[0], 1.0
+        if escapes[-1] in (FREE, ESCAPED):
+            yield later, settings.biases[0], 1.0
+        if not settings.avoid:
+            return
+        yield guide, settings.biases[0], settings.tight
+        if escapes[-1] == ESCAPED:
+            for bias in settings.biases[1:]:
+                yield guide, bias, settings.tight
 
     def _leg(self, scene, demonstrated, goal, lead, q, fraction, bias, factor, seed):
         b, motion = self._buffers, self.settings.motion
@@ -286,6 +289,3 @@ def plan_batch(
     with ThreadPoolExecutor(workers) as pool:
         shares = list(pool.map(run, [problems[k::workers] for k in range(workers)]))
     return [shares[k % workers][k // workers] for k in range(len(problems))]
-
-
-__all__ = ["GUIDE", "Plan", "PlanSettings", "Planner", "Problem", "plan", "plan_batch"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from .arm import Arm
 from .demo import Demonstration, Segment
-from .demo_io import read_arrays, unit_poses
+from .demo_io import numbers, read_arrays, unit_poses
 from .errors import BadDemonstration, UnknownName
 from .pose import Pose, PosePath
 from .segment import dwells, gripper_events
@@ -39,9 +39,17 @@ def stack_from_teleoperation(path: str | Path, arm: Arm, *, name: str, licence: 
     for key in TELEOPERATION_KEYS:
         if key not in arrays:
             raise BadDemonstration(path, key, f"is missing; a recording holds: {', '.join(TELEOPERATION_KEYS)}")
-    q, gripper = arrays["q"][:, : arm.dof], np.sign(arrays["actions"][:, -1])
-    hand = PosePath(np.array([arm.fk(row).dq for row in q]))
+    time, q, actions = (numbers(path, key, arrays[key], width) for key, width in (("t", 1), ("q", 2), ("actions", 2)))
     cubes = {key: unit_poses(path, f"obj_{key}_jnt0", arrays[f"obj_{key}_jnt0"]) for key in CUBES}
+    for key in TELEOPERATION_KEYS:
+        if len(arrays[key]) != len(time):
+            raise BadDemonstration(path, key, f"has {len(arrays[key])} samples; t has {len(time)}")
+    if q.shape[1] < arm.dof:
+        raise BadDemonstration(path, "q", f"has {q.shape[1]} columns; the {arm.name} has {arm.dof} joints")
+    if len(time) < 2 or actions.shape[1] < 1:
+        raise BadDemonstration(path, "actions", f"has shape {actions.shape}; expected 2 samples or more, gripper last")
+    q, gripper = q[:, : arm.dof], np.sign(actions[:, -1])
+    hand = PosePath(np.array([arm.fk(row).dq for row in q]))
     events = gripper_events(gripper)
     if len(events) != 2 or gripper[0] > 0:
         reason = f"the gripper changes {len(events)} times; expected one closing and one opening"
@@ -51,20 +59,23 @@ def stack_from_teleoperation(path: str | Path, arm: Arm, *, name: str, licence: 
         Segment("approach", 0, closing, "cubeA", Pose.from_vector(cubes["cubeA"][closing]), "", "close"),
         Segment("transfer", closing + 1, opening, "cubeB", Pose.from_vector(cubes["cubeB"][opening]), "cubeA", "open"),
     )
-    return Demonstration(
-        name=name,
-        task="stack",
-        robot=arm.name,
-        tcp_frame="grip_site",
-        source="teleoperated",
-        licence=licence,
-        time=arrays["t"],
-        path=hand,
-        joint_positions=q,
-        gripper=gripper,
-        segments=segments,
-        object_sizes={key: np.array(size) for key, size in CUBES.items()},
-    )
+    try:
+        return Demonstration(
+            name=name,
+            task="stack",
+            robot=arm.name,
+            tcp_frame="grip_site",
+            source="teleoperated",
+            licence=licence,
+            time=time,
+            path=hand,
+            joint_positions=q,
+            gripper=gripper,
+            segments=segments,
+            object_sizes={key: np.array(size) for key, size in CUBES.items()},
+        )
+    except BadDemonstration as error:
+        raise BadDemonstration(path, error.key, error.reason) from None
 
 
 def from_pose_table(
@@ -118,10 +129,12 @@ def _table(path: Path) -> np.ndarray:
         raise BadDemonstration(path, "file", "does not exist")
     try:
         if path.suffix == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+            return numbers(path, "table", np.load(path, allow_pickle=False), 2)
         first = path.read_text(encoding="utf-8").split("\n", 1)[0]
         header = int(any(letter.isalpha() and letter not in "eE" for letter in first))
         return np.loadtxt(path, delimiter=",", skiprows=header, ndmin=2)
+    except BadDemonstration:
+        raise
     except (ValueError, EOFError, OSError, UnicodeDecodeError) as error:
         raise BadDemonstration(path, "table", f"cannot be read: {str(error).splitlines()[0]}") from None
 

@@ -31,6 +31,7 @@ from .escape_tree import (
 from .pose import Pose, PosePath
 from .shapes import Obstacle, pack
 
+Corner = tuple[float, float, float]
 REASONS = {
     FREE: "",
     ESCAPED: "",
@@ -102,8 +103,11 @@ class RepetSettings:
     shortcut: bool = True
     pull_back: bool = False
     spacing: float = 0.01
-    bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    workspace: tuple[tuple[float, float, float], tuple[float, float, float]] = ((-10.0,) * 3, (10.0,) * 3)
+    bias: Corner = (0.0, 0.0, 0.0)
+    workspace: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (-10.0, -10.0, -10.0),
+        (10.0, 10.0, 10.0),
+    )
     longest: int = 4000
 
     def __post_init__(self):

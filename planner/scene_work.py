@@ -65,6 +65,12 @@ class SceneWork:
         """The arrays for the distances of these settings."""
         return SceneWork(arm, body, obstacles, settings.safety, settings.repet.distance, allowed)
 
+    def move(self, obstacles: Sequence[Obstacle]) -> None:
+        """The same obstacles at other places, with other velocities."""
+        rows = pack(obstacles).rows
+        for work in (self.robot, self._tool):
+            work[OBSTACLES : OBSTACLES + len(rows), : rows.shape[1]] = rows
+
     def tool(self, factor: float = 1.0) -> np.ndarray:
         """The tool's array, planning distances scaled where an obstacle has none of its own."""
         self._margins[~self._own] = factor * self._distance

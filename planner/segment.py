@@ -22,8 +22,9 @@ def gripper_events(gripper: np.ndarray) -> np.ndarray:
 
 def dwells(time: np.ndarray, path: PosePath) -> list[tuple[int, int]]:
     """Sample ranges, both ends included, in which the hand rests for longer than 0.3 s."""
-    speed = np.diff(path.lengths()) / np.diff(time)
-    moving = speed[speed > 0]
+    steps = np.diff(path.lengths())
+    speed = steps / np.diff(time)
+    moving = speed[steps > SAME]
     if not len(moving):
         return [(0, len(path) - 1)]
     slow = speed < DWELL_SPEED * np.median(moving)

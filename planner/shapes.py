@@ -143,6 +143,14 @@ class Mesh:
         points.flags.writeable = False
         _set(self, vertices=points)
 
+    def __eq__(self, other: object) -> bool:
+        """The same vertices in the same order."""
+        return isinstance(other, Mesh) and np.array_equal(self.vertices, other.vertices)
+
+    def __hash__(self) -> int:
+        """Of the vertices."""
+        return hash(self.vertices.tobytes())
+
     @staticmethod
     def hull_of(points: np.ndarray) -> Mesh:
         """The convex hull of points (n, 3)."""

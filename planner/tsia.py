@@ -15,6 +15,10 @@ from . import dualquat as dq
 from .errors import BadOption, PlanFailed
 from .pose import METERS_PER_RADIAN, Pose, PosePath
 
+STILL = 1e-9
+"""A path whose screw length [m] is not above this stands still: what there is of it is rounding."""
+BLEND_STEP, LEAST_STEP = 0.005, 1e-5
+"""Screw length [m] between the poses of a blend into a path that stands still, and the least into any other."""
 GUIDE_START = 0.2
 """Fraction of the imitated path where blending ends; the value of the paper's experiments."""
 
@@ -53,7 +57,7 @@ def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "len
         index = math.ceil(fraction * last)
     elif by == "length":
         lengths = path.lengths()
-        index = int(np.argmax(lengths >= fraction * lengths[-1])) if lengths[-1] > 0 else last
+        index = int(np.argmax(lengths >= fraction * lengths[-1])) if lengths[-1] > STILL else last
     else:
         raise BadOption("by", f"{by!r} is not one of length, index")
     return min(max(index, 1), last)
@@ -77,9 +81,9 @@ def final_path(start: Pose, imitated: PosePath, guide: int) -> PosePath:
         imitated: the imitated path.
         guide: index of the guiding pose in it.
     """
-    lengths = imitated.lengths()
-    step = lengths[-1] / max(len(imitated) - 1, 1)
-    blend = screw_path(start, imitated[guide], step if step > 0 else 0.005)
+    length = imitated.lengths()[-1]
+    step = max(length / (len(imitated) - 1), LEAST_STEP) if length > STILL else BLEND_STEP
+    blend = screw_path(start, imitated[guide], step)
     tail = imitated[guide:]
     return PosePath(np.concatenate([blend.dqs[:-1], tail.dqs]))
 
@@ -108,7 +112,7 @@ def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
     from_start = demonstrated.moved(start @ demonstrated[0].inverse())
     to_goal = imitated_path(demonstrated, goal)
     lengths = demonstrated.lengths()
-    s = lengths / lengths[-1] if lengths[-1] > 0 else np.linspace(0.0, 1.0, len(demonstrated))
+    s = lengths / lengths[-1] if lengths[-1] > STILL else np.linspace(0.0, 1.0, len(demonstrated))
     # one way round for the whole path: the scalar part between the two is the same at every pose
     way = 1.0 if dq.mul(dq.conj(from_start.dqs[0]), to_goal.dqs[0])[0] >= 0.0 else -1.0
     return PosePath(dq.sclerp(from_start.dqs, way * to_goal.dqs, s * s * (3.0 - 2.0 * s), shortest=False))

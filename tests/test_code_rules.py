@@ -17,7 +17,7 @@ LOWER = {
     "configs": {"planner"},
     "bench": {"planner", "envs", "baselines", "configs"},
 }
-ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit", "chain", "screw"}
+ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit", "chain", "screw", "shapes", "body", "body_models"}
 """The planner's lowest floor."""
 PLANNER_ORDER = [
     "errors",
@@ -62,6 +62,7 @@ PLANNER_ORDER = [
     "joint_leg",
     "leg",
     "planning",
+    "reactive",
     "segment",
     "demo",
     "demo_io",
@@ -84,6 +85,7 @@ ENVS_ORDER = [
     "servos",
     "table_model",
     "scene",
+    "bodies",
     "sim",
     "render",
     "base",

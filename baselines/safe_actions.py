@@ -1,0 +1,105 @@
+"""The safety layer around any policy: a Gymnasium action wrapper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from ..planner.body_models import resting_pairs
+from ..planner.errors import BadOption
+from ..planner.safety import SafetyLayer, SafetySettings
+from .policy import Observation
+from .surroundings import Surroundings
+
+MARGIN = 0.005
+"""Distance [m] to keep from the table and from objects: more than the arm lags, less than a grasp needs."""
+WITHIN_REACH = 0.06
+"""Distance [m] of an object's center from the tcp within which fingers may touch it."""
+
+
+class SafeActions(gym.Wrapper):
+    """Change every action, whoever chose it, so that no arm touches what it should not.
+
+    The arm must not touch the table, nor objects, nor obstacles, nor itself; fingers may touch an object between
+    them. `info["safety"]` says what was done: 0 nothing, 1 the command was changed, 2 it was shortened, 3 blocked
+    (what must hold cannot hold). What is held is not known to the wrapper and not guarded.
+
+    The joints that were commanded are guarded, not those measured: the servos lag by 40 ms. Put the worst tracking
+    error, 2.5 mm in the shipped scenes, into `settings.distance`.
+
+    Args:
+        env: an environment of this project in the control mode `joint_velocity`.
+        settings: see `SafetySettings`.
+    """
+
+    def __init__(self, env: gym.Env, settings: SafetySettings | None = None):
+        super().__init__(env)
+        inner: Any = env.unwrapped
+        if getattr(inner, "control_mode", None) != "joint_velocity":
+            raise BadOption("control_mode", "the safety layer needs joint_velocity")
+        self.settings, self._task = settings or SafetySettings(), inner.task
+        self._pairs = _pairs_of(self._task.arms, self._task.bodies)
+        self._surroundings = Surroundings(self._task, table_margin=MARGIN, margin=MARGIN)
+        self._q = np.zeros((len(self._task.arms), self._task.arms[0].dof))
+        self._key: tuple[Any, ...] = ()
+        self._layer: SafetyLayer | None = None
+        self._observation: Observation = {}
+
+    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+        """Start an episode; the commanded joints are those observed."""
+        observation, info = self.env.reset(**kwargs)
+        self._q = np.array(observation["joint_positions"])
+        self._observation = observation
+        return observation, {**info, "safety": 0}
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Act as safely as can be."""
+        safe, status = self.safe_action(np.asarray(action, dtype=np.float64))
+        self._observation, reward, terminated, truncated, info = self.env.step(safe)
+        return self._observation, reward, terminated, truncated, {**info, "safety": status}
+
+    def safe_action(self, action: np.ndarray) -> tuple[np.ndarray, int]:
+        """The action that is taken instead, and what was done to it; the commanded joints move on with it."""
+        arms, dt = self._task.arms, self._task.control_dt
+        rows = action.reshape(len(arms), -1)
+        limits = np.array([arm.velocity_limits for arm in arms])
+        filtered = self._bound_layer()(self._q.ravel(), (np.clip(rows[:, :-1], -1.0, 1.0) * limits).ravel())
+        speeds = filtered.velocity.reshape(limits.shape)
+        self._q = self._q + dt * speeds
+        return np.column_stack([speeds / limits, rows[:, -1]]).reshape(action.shape), filtered.status
+
+    def _bound_layer(self) -> SafetyLayer:
+        """The layer for what is around now; made anew only when something has moved."""
+        obstacles = self._surroundings.seen(self._observation)
+        near = tuple(self._near_objects())
+        if self._layer is None or self._key[0] is not obstacles or self._key[1] != near:
+            self._key = (obstacles, near)
+            task = self._task
+            allowed = [("fingers", name) for name in near]
+            self._layer = SafetyLayer(
+                task.arms, task.bodies, obstacles, task.control_dt,
+                settings=self.settings, allowed=allowed, pairs=self._pairs,
+            )  # fmt: skip
+        return self._layer
+
+    def _near_objects(self) -> list[str]:
+        centers = self._observation["object_pose"][:, :3]
+        reach = np.linalg.norm(centers[:, None] - self._observation["tcp_pose"][None, :, :3], axis=2).min(axis=1)
+        return [each.name for each, way in zip(self._task.objects, reach, strict=True) if way < WITHIN_REACH]
+
+
+def _pairs_of(arms: Sequence[Any], bodies: Sequence[Any]) -> list[tuple[int, int]]:
+    """Capsules, counted through all bodies, that may hit each other: of one arm those apart, of two arms all."""
+    pairs, first = [], 0
+    starts = np.concatenate([[0], np.cumsum([len(body) for body in bodies])])
+    for arm, body in zip(arms, bodies, strict=True):
+        resting = {tuple(sorted(pair)) for pair in resting_pairs(arm, body)}
+        own = [(i, j) for i in range(len(body)) for j in range(i + 1, len(body)) if (i, j) not in resting]
+        pairs += [(first + i, first + j) for i, j in own]
+        first += len(body)
+    if len(bodies) == 2:
+        pairs += [(i, j) for i in range(starts[1]) for j in range(int(starts[1]), int(starts[2]))]
+    return pairs

@@ -1,0 +1,55 @@
+"""The capsules that contain a robot's arms: fitted once (`fitted_bodies`), shipped as a table, read in no time."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..planner.body import Body
+from ..planner.body_models import body_from_mujoco
+from ..planner.errors import UnknownName
+from .scene import compiled_scene
+
+TABLE = Path(__file__).parent / "assets" / "bodies.json"
+DIGITS = 5
+"""Of the shipped numbers [m]; radii are rounded up."""
+
+
+def fitted_bodies(robot: str) -> tuple[Body, ...]:
+    """The bodies of a robot's arms, fitted to its collision geometry; takes some seconds per arm."""
+    scene = compiled_scene(robot, ())
+    bodies = [body_from_mujoco(scene.model, index.arm, index.arm.joint_names) for index in scene.arms]
+    return tuple(_rounded(body) for body in bodies)
+
+
+@cache
+def robot_body(robot: str, index: int = 0) -> Body:
+    """The capsules of a robot's arm as it stands at the table, hand and fingers over their whole range included.
+
+    Raises:
+        UnknownName: no such robot is shipped.
+    """
+    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    if robot not in table:
+        raise UnknownName("robot with a body", robot, table)
+    entry = table[robot][index]
+    return Body(np.array(entry["rows"]), tuple(entry["names"]))
+
+
+def table_text(robots: tuple[str, ...]) -> str:
+    """The shipped table, fitted anew: what `make bodies` writes."""
+    table = {
+        robot: [{"names": list(body.names), "rows": body.rows.tolist()} for body in fitted_bodies(robot)]
+        for robot in robots
+    }
+    return json.dumps(table, indent=1) + "\n"
+
+
+def _rounded(body: Body) -> Body:
+    rows = np.round(body.rows, DIGITS)
+    # the ends may move by half a unit each way, so the radius takes up two
+    rows[:, 7] = np.ceil(body.rows[:, 7] * 10**DIGITS + 2.0) / 10**DIGITS
+    return Body(rows, body.names)
