@@ -16,6 +16,8 @@ from .surroundings import Surroundings
 
 MARGIN = 0.005
 """Distance [m] to keep from the table and from objects: more than the arm lags, less than a grasp needs."""
+SAFE = SafetySettings(self_distance=0.005, rest_weight=0.05, acceleration=5.0)
+"""The robots' wrists cannot follow sudden changes: what is commanded must be what is done."""
 WITHIN_REACH = 0.06
 """Distance [m] of an object's center from the tcp within which fingers may touch it."""
 
@@ -40,7 +42,7 @@ class SafeActions(gym.Wrapper):
         inner: Any = env.unwrapped
         if getattr(inner, "control_mode", None) != "joint_velocity":
             raise BadOption("control_mode", "the safety layer needs joint_velocity")
-        self.settings, self._task = settings or SafetySettings(), inner.task
+        self.settings, self._task = settings or SAFE, inner.task
         self._pairs = _pairs_of(self._task.arms, self._task.bodies)
         self._surroundings = Surroundings(self._task, table_margin=MARGIN, margin=MARGIN)
         self._q = np.zeros((len(self._task.arms), self._task.arms[0].dof))

@@ -82,9 +82,8 @@ def usage_line(error: Any) -> str:
     context = getattr(error, "ctx", None)
     if not text or context is None:
         return text
-    options = ", ".join(
-        sorted(name for each in context.command.get_params(context) for name in each.opts if "-" in name)
-    )
+    names = [name for each in context.command.get_params(context) for name in each.opts]
+    options = ", ".join(name for name in names if name.startswith("-"))
     commands = getattr(context.command, "commands", None)
     if commands is not None:
         return f"{text}; {context.command_path} knows: {', '.join(commands)}, {options}"

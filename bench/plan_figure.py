@@ -190,9 +190,9 @@ def _paint(axes: Any, planned: Planned, content: Content, view: View) -> None:
             axes.plot(*view.flat(below).T, color=SHADOW, linewidth=2.0, alpha=0.55, zorder=3.5)
     dashed = {"linestyle": (0, (4.5, 2.2)), "linewidth": 2.1, "zorder": 31}
     _paint_line(axes, content.demonstrated, content, view, color=DEMONSTRATED, **dashed)
-    _paint_line(axes, content.final, content, view, color=FINAL, linewidth=4.4, zorder=30)
+    _paint_line(axes, content.final, content, view, color=FINAL, linewidth=3.4, zorder=30)
     if len(content.executed):
-        _paint_line(axes, content.executed, content, view, color=FREE, linewidth=2.2, zorder=32)
+        _paint_line(axes, content.executed, content, view, color=FREE, linewidth=2.0, zorder=32)
     tips = [f.position + share * TRIAD * f.rotation.T for f in content.frames for share in (0.0, 0.5, 1.0)]
     lines = view.flat(np.vstack([content.demonstrated, content.final, content.executed, *tips]))
     for pose, label in zip(content.frames, ("start", "goal"), strict=True):
@@ -299,10 +299,10 @@ def _legend(figure: Any, planned: Planned, content: Content) -> None:
 
     entries: list[Any] = [
         Line2D([], [], color=DEMONSTRATED, linewidth=2.1, linestyle=(0, (4.5, 2.2)), label="demonstration"),
-        Line2D([], [], color=FINAL, linewidth=4.0, label="final path"),
+        Line2D([], [], color=FINAL, linewidth=3.4, label="final path"),
     ]
     if len(content.executed):
-        entries.append(Line2D([], [], color=FREE, linewidth=2.2, label="collision-free path"))
+        entries.append(Line2D([], [], color=FREE, linewidth=2.0, label="collision-free path"))
     if content.solids:
         entries.append(Patch(facecolor="#e9b872", edgecolor="#8a5a17", alpha=0.75, label="obstacle"))
     if any(content.shelled):

@@ -131,6 +131,6 @@ class Film:
         from imageio_ffmpeg import count_frames_and_secs
 
         try:
-            return count_frames_and_secs(self._part)[0]
+            return count_frames_and_secs(self._part)[0] or 0
         except (OSError, RuntimeError):
             return 0

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ..planner.demo_io import load_demonstration, unit_poses
-from ..planner.errors import BadConfig, BadDemonstration, OneDemoError, UnknownName
+from ..planner.errors import BadConfig, BadDemonstration, OneDemoError, UnfitShape, UnknownName
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
-from ..planner.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
+from ..planner.shapes import LARGEST, Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
 from .loader import COMMAND_LINE, load_mapping, with_overrides
 from .scene_schema import HeldItem, Placed, Recorded, SceneConfig, Solid, checked
 from .shipped import FOLDER, shipped_demonstration
@@ -136,7 +136,7 @@ def _blaming(source: Path, changed: frozenset[str], key: str) -> Iterator[None]:
         raise
     except BadDemonstration as error:
         own = f"{error.key}: {error.reason}"
-        reason = own if error.path is None else f"{error.path}: {own}"
+        reason = f"{error.path}: {own}" if error.path else own
         raise BadConfig(_blamed(source, changed, key), key, reason) from None
     except OneDemoError as error:
         raise BadConfig(_blamed(source, changed, key), key, str(error)) from None
@@ -149,7 +149,9 @@ def _beside(source: Path, name: str) -> Path:
 
 def _demonstrated(source: Path, wanted: Recorded | list[list[float]]) -> PosePath:
     if not isinstance(wanted, Recorded):
-        return PosePath.from_vectors(unit_poses("", "poses", np.array(wanted)))
+        poses = unit_poses("", "poses", np.array(wanted))
+        _near(poses[:, :3])
+        return PosePath.from_vectors(poses)
     plain = Path(wanted.file).suffix == "" and len(Path(wanted.file).parts) == 1
     file = _beside(source, wanted.file)
     demonstration = load_demonstration(shipped_demonstration(wanted.file) if plain and not file.is_file() else file)
@@ -157,15 +159,26 @@ def _demonstrated(source: Path, wanted: Recorded | list[list[float]]) -> PosePat
 
 
 def _pose(vector: Sequence[float]) -> Pose:
-    return Pose.from_vector(unit_poses("", "pose", np.array([vector]))[0])
+    poses = unit_poses("", "pose", np.array([vector]))
+    _near(poses[:, :3])
+    return Pose.from_vector(poses[0])
+
+
+def _near(positions: np.ndarray) -> np.ndarray:
+    """The positions (..., 3), if they are in metres."""
+    farthest = float(np.abs(positions).max())
+    if farthest > LARGEST:
+        raise UnfitShape("pose", "position", f"{farthest:g} m away: millimetres?")
+    return positions
 
 
 def _placed(placed: Placed) -> Pose:
     if placed.quaternion is not None:
         return _pose([*placed.position, *placed.quaternion])
+    at = _near(np.array(placed.position))
     roll, pitch, yaw = placed.rpy_degrees or (0.0, 0.0, placed.yaw_degrees or 0.0)
     turns = [_turn(2, yaw), _turn(1, pitch), _turn(0, roll)]
-    return Pose.from_position_quaternion(placed.position) @ turns[0] @ turns[1] @ turns[2]
+    return Pose.from_position_quaternion(at) @ turns[0] @ turns[1] @ turns[2]
 
 
 def _turn(axis: int, degrees: float) -> Pose:

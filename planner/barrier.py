@@ -37,6 +37,7 @@ from .robot_work import (
     N_NEAR,
     NEAR,
     OBSTACLES,
+    PREVIOUS,
     SETTINGS,
     SLIDING,
     SPEED,
@@ -48,7 +49,7 @@ from .robot_work import (
 )
 from .screw import translation
 
-SHELL, ALPHA, BUFFER, LIMIT_GAIN, ROTATION_WEIGHT, REST_WEIGHT, DECAY, HALVINGS = range(8)
+SHELL, ALPHA, BUFFER, LIMIT_GAIN, ROTATION_WEIGHT, REST_WEIGHT, DECAY, HALVINGS, SLEW = range(9)
 """Columns of SETTINGS, see `safety.SafetySettings`; column 10 is the distance between parts of the robot."""
 
 
@@ -90,7 +91,7 @@ def _lay_bounds(g, q):
         g[row, BOUND], g[row, SOFTNESS] = need, SLACK
         row += 1
     for i in range(n):
-        low, high = allowed_speeds(g, q, i)
+        low, high = _reachable_speeds(g, q, i)
         for sign in (1.0, -1.0):
             for j in range(n):
                 g[row, j] = 0.0
@@ -106,6 +107,14 @@ def allowed_speeds(g, q, i):
     gain = g[SETTINGS, LIMIT_GAIN]
     low = max(-g[SPEED, i], min(0.0, gain * (g[LOW, i] - q[i])))
     return low, min(g[SPEED, i], max(0.0, gain * (g[HIGH, i] - q[i])))
+
+
+@inner
+def _reachable_speeds(g, q, i):
+    """Of the allowed speeds of joint i those within the slew of its last one; the nearest one if there is none."""
+    low, high = allowed_speeds(g, q, i)
+    slower, faster = g[PREVIOUS, i] - g[SETTINGS, SLEW], g[PREVIOUS, i] + g[SETTINGS, SLEW]
+    return min(high, max(low, slower)), max(low, min(high, faster))
 
 
 @inner
@@ -156,9 +165,9 @@ def scale_to_speeds(g, x):
 
 @kernel
 def exceeds_limits(g, q, x):
-    """True if a joint approaches one of its limits faster than it may."""
+    """True if a joint approaches one of its limits faster than it may, or changes its speed by more."""
     for i in range(len(x)):
-        low, high = allowed_speeds(g, q, i)
+        low, high = _reachable_speeds(g, q, i)
         if x[i] > high or x[i] < low:
             return True
     return False

@@ -86,6 +86,7 @@ def _compiled(function: Callable[..., Any], options: dict[str, bool]) -> Any:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))
     try:
-        return numba.njit(cache=True, error_model="numpy", nogil=True, **options)(function)
+        compiler: Any = numba.njit(cache=True, error_model="numpy", nogil=True, **options)
+        return compiler(function)
     finally:
         config.CACHE_DIR = before

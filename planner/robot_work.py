@@ -10,6 +10,7 @@ Python cheap and nothing is allocated in a loop. One per thread.
 | ARMS | per arm: first joint, joints, first row of its chain |
 | LOW, HIGH, SPEED, SLIDING | joint limits, largest speeds, 1 for a sliding joint |
 | STEP to ACTIVE | scratch of the width of the joints |
+| PREVIOUS | the speeds that were commanded last |
 | TCPS | per arm: pose of its tcp |
 | CHAINS, FRAMES | see `chain`; the frame of joint j is row FRAMES + j |
 | BODY | per capsule: arm, joint whose frame it moves with (-1: none), ends in that frame, radius |
@@ -38,7 +39,7 @@ from .shapes import ROW, Packed
 WIDTH = 40
 MAX_ARMS, MAX_JOINTS, MAX_CAPSULES = 2, 16, 52
 HEADER, SETTINGS, ARMS, LOW, HIGH, SPEED = 0, 1, 2, 3, 4, 5
-STEP, WISH, PART, AFTER, BEFORE, ACTIVE = 6, 7, 8, 9, 10, 11
+STEP, WISH, PART, AFTER, BEFORE, ACTIVE, PREVIOUS = 6, 7, 8, 9, 10, 11, 12
 SLIDING, TCPS, WEIGHT, CHAINS = 13, 14, 16, 32
 FRAMES, BODY, WORLD, NEXT, FACTOR, OBSTACLES = 64, 84, 136, 188, 240, 272
 # columns of the header

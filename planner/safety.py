@@ -22,7 +22,7 @@ from .body import Body
 from .clearance import find_near, reach_of, room_of_near, step_stays_clear
 from .errors import BadOption, BadShape, UnknownName
 from .jit import inner, kernel
-from .robot_work import HEADER, N_NEAR, NEXT, SETTINGS, STEP, WISH, WORLD, place_capsules, robot_work
+from .robot_work import HEADER, N_NEAR, NEXT, PREVIOUS, SETTINGS, STEP, WISH, WORLD, place_capsules, robot_work
 from .shapes import Obstacle, pack
 
 FREE, CHANGED, HELD, BLOCKED = 0, 1, 2, 3
@@ -45,6 +45,8 @@ class SafetySettings:
         limit_gain: approach to a joint limit is at most this times the distance to it [1/s].
         rotation_weight: of the tools' turning against their moving, in what "nearest speeds" means [m^2].
         rest_weight: of a joint's own motion [m^2].
+        acceleration: largest change of a joint's speed [rad/s^2] that the bounds ask for, for arms that are not
+            ideal; stopping in the guard is not bound by it.
         lead: seconds that moving obstacles are looked at ahead of time, for arms that lag.
     """
 
@@ -58,10 +60,11 @@ class SafetySettings:
     limit_gain: float = 20.0
     rotation_weight: float = 0.04
     rest_weight: float = 0.01
+    acceleration: float = 1e6
     lead: float = 0.0
 
     def __post_init__(self):
-        for name in ("alpha", "shell", "limit_gain", "rotation_weight", "rest_weight"):
+        for name in ("alpha", "shell", "limit_gain", "rotation_weight", "rest_weight", "acceleration"):
             if not 0 < getattr(self, name) < math.inf:
                 raise BadOption(name, f"{getattr(self, name)} is not a positive number")
         for name in ("distance", "self_distance", "buffer", "lead"):
@@ -74,10 +77,10 @@ class SafetySettings:
         if self.shell <= max(self.distance, self.self_distance):
             raise BadOption("shell", f"{self.shell} is not above the distance to keep, {self.distance}")
 
-    def packed(self) -> tuple[float, ...]:
-        """The settings as the kernels take them."""
+    def packed(self, dt: float) -> tuple[float, ...]:
+        """The settings as the kernels take them, for commands that are held for dt seconds."""
         rates = (self.shell, self.alpha, self.buffer, self.limit_gain, self.rotation_weight, self.rest_weight)
-        return (*rates, self.decay, float(self.halvings), 0.0, 0.0, self.self_distance)
+        return (*rates, self.decay, float(self.halvings), self.acceleration * dt, 0.0, self.self_distance)
 
 
 @inner
@@ -142,6 +145,8 @@ def safe_velocity(g, q, qdot, dt, out):
         if out[i] != qdot[i]:
             status = CHANGED
     status = max(status, _shortened(g, q, out, dt))
+    for i in range(n):
+        g[PREVIOUS, i] = out[i]
     return BLOCKED if missed else status
 
 
@@ -200,7 +205,7 @@ class SafetyLayer:
             masks=contact_masks([name for body in bodies for name in body.names], obstacles, allowed),
             margin=self.settings.distance,
             pairs=pairs,
-            settings=self.settings.packed(),
+            settings=self.settings.packed(self.dt),
         )
 
     def __call__(self, q: ArrayLike, velocity: ArrayLike) -> Filtered:

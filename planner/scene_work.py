@@ -40,12 +40,13 @@ class SceneWork:
         obstacles: Sequence[Obstacle],
         safety: SafetySettings,
         distance: float,
+        dt: float,
         allowed: Sequence[tuple[str, str]] = (),
     ):
         packed = pack(obstacles)
         masks = contact_masks(body.names, obstacles, allowed)
         self.robot = robot_work(
-            (arm,), (body,), packed, masks=masks, margin=safety.distance, settings=safety.packed(), most_near=0
+            (arm,), (body,), packed, masks=masks, margin=safety.distance, settings=safety.packed(dt), most_near=0
         )
         at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
         tool_masks = [sum(1 << k for k, row in enumerate(at_tool) if mask >> int(row) & 1) for mask in masks]
@@ -63,7 +64,8 @@ class SceneWork:
         allowed: Sequence[tuple[str, str]] = (),
     ) -> SceneWork:
         """The arrays for the distances of these settings."""
-        return SceneWork(arm, body, obstacles, settings.safety, settings.repet.distance, allowed)
+        distance, dt = settings.repet.distance, settings.motion.dt
+        return SceneWork(arm, body, obstacles, settings.safety, distance, dt, allowed)
 
     def move(self, obstacles: Sequence[Obstacle]) -> None:
         """The same obstacles at other places, with other velocities."""

@@ -36,7 +36,7 @@ from onedemo.planner.shapes import Box, Obstacle
 from onedemo.planner.tangent import random_number
 
 BANG, RANDOM, STEEPEST, TOWARDS, CORNER, ABSURD, GRAZE = range(7)
-MODES = 7
+MODES = (BANG, RANDOM, CORNER, ABSURD, STEEPEST, TOWARDS, GRAZE, STEEPEST, TOWARDS, GRAZE)
 # columns of a tally
 STEPS, TOO_CLOSE, WORST, BEYOND, ROOMY, FALSE_STOPS, STATUS, STOPPED, AT_SURFACE = 0, 1, 2, 3, 4, 5, 6, 10, 11
 TALLY = 12
@@ -108,9 +108,9 @@ def drive(g, eye, starts, steps, dt, substeps, state, tally, log):
     for k in range(steps):
         if k % 500 == 0:
             q[:] = starts[(k // 500) % len(starts)]
-        if k % 40 == 0:
-            mode = int(MODES * random_number(state))
-        if k % 40 == 0 or (mode == BANG and random_number(state) < 0.2):
+        if k % 80 == 0:
+            mode = MODES[int(len(MODES) * random_number(state))]
+        if k % 80 == 0 or (mode == BANG and random_number(state) < 0.2):
             for i in range(n):
                 keep[i] = 1.0 if random_number(state) < 0.5 else -1.0
         command(eye, q, mode, state, keep, wanted)
@@ -201,6 +201,7 @@ def random_robot(rng: np.random.Generator, kind: str) -> Robot:
     return Robot([arm], [body], [pair for pair in some if rng.uniform() < 0.5])
 
 
+@cache
 def facing_pandas(gap: float = 0.8) -> Robot:
     there = Pose.from_position_quaternion([gap, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
     other = Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8", world_from_base=there)
@@ -239,7 +240,7 @@ def random_scene(seed: int, kind: str = "", tries: int = 300) -> Scene:
     rng = np.random.default_rng(seed)
     while True:
         robot = random_robot(rng, kind or str(rng.choice(["panda", "random", "random"])))
-        obstacles, dt = random_obstacles(rng), float(rng.choice([0.002, 0.01, 0.05]))
+        obstacles, dt = random_obstacles(rng), float(rng.choice([0.005, 0.01, 0.05]))
         layer = SafetyLayer(robot.arms, robot.bodies, obstacles, dt, settings=SETTINGS_USED, pairs=robot.pairs)
         # the distance to keep, for the tally
         layer.work[SETTINGS, 11] = SETTINGS_USED.distance

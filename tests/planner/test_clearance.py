@@ -394,7 +394,9 @@ def test_the_clearance_does_not_depend_on_the_frame_of_the_world():
     rng = np.random.default_rng(2)
     arm = random_arm(2, 5, 0.3)
     body, obstacles = random_body(arm, rng), random_obstacles(rng)
-    body = Body(body.rows[body.rows[:, 0] >= 0], tuple(n for n, r in zip(body.names, body.rows, strict=True) if r[0] >= 0))
+    body = Body(
+        body.rows[body.rows[:, 0] >= 0], tuple(n for n, r in zip(body.names, body.rows, strict=True) if r[0] >= 0)
+    )
     moved = random_pose(rng, (0.3, -0.2, 0.5))
     chain = arm.chain.copy()
     first = moved @ Pose.from_position_quaternion(chain[0, 4:7], chain[0, :4])
