@@ -53,8 +53,10 @@ def seconds_per_call(*functions: Callable[[], object], together: bool = False) -
     if together:
         counts = [min(counts)] * len(counts)
     samples: list[list[float]] = [[] for _ in functions]
-    for _ in range(BATCHES):
-        for function, count, sample in zip(functions, counts, samples, strict=True):
+    runs = list(zip(functions, counts, samples, strict=True))
+    for batch in range(BATCHES):
+        # there and back, so that what disturbs at a steady beat does not always hit the same one
+        for function, count, sample in runs[:: -1 if batch % 2 else 1]:
             start = time.perf_counter()
             for _ in range(count):
                 function()

@@ -13,26 +13,35 @@ import numpy as np
 from ..planner.body import FRAME, RADIUS, A, B, Body
 from ..planner.certify import Certificate
 from ..planner.links import joint_frames
-from ..planner.pose import Pose, PosePath
-from ..planner.repet import EscapeTree
+from ..planner.pose import Pose
 from ..planner.segment import resampled
 from ..planner.tsia import final_path, guide_index, imitated_path
 from .plan_command import Planned
 from .plan_solids import arm_patch, floor_corners, paint_arm, paint_floor, paint_shells, paint_solid
-from .plan_view import Solid, View, back_to_front, ball_along, best_view, solid_of
+from .plan_tree import KEPT, PLANE, REJECTED, paint_tree
+from .plan_view import Solid, View, back_to_front, ball_along, best_view, hidden_by, solid_of
 
 DEMONSTRATED, FINAL, FREE = "#1f4fd8", "#d81fb4", "#00a9c7"
-SHADOW, PLANE, KEPT, REJECTED = "#bdb6a8", "#2f9e5b", "#7a7a7a", "#d9482b"
+SHADOW = "#bdb6a8"
 FRAME_COLORS = ("#d43c3c", "#3aa03a", "#3a5fd4")
 GROUND = ("table", "floor", "ground")
 """Boxes of these names are drawn as the floor that they are."""
 HIDDEN = 0.34
 """Opacity of lines behind a solid."""
-TRIAD, PLANE_SIDE, LABEL = 0.055, 0.05, 0.035
+TRIAD, LABEL = 0.055, 0.035
 """Lengths [m]."""
+DPI = 144
+OPTIONS: dict[str, dict[str, Any]] = {
+    ".png": {"pil_kwargs": {"optimize": True}},
+    ".pdf": {"metadata": {"CreationDate": None}},
+    ".svg": {"metadata": {"Date": None}},
+}
+"""Small files, and the same ones every time."""
+BORDER = np.array([0.06, 0.06, 0.0])
+"""Of the floor, for the numbers on it [m]."""
+SIDES = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
 WIDTH, ABOVE, BELOW = 9.0, 0.4, 0.72
 """Of the figure, and of the room for title and legend [inches]."""
-MOST_REJECTED = 1500
 
 
 class Content(NamedTuple):
@@ -83,10 +92,17 @@ def draw_plan(planned: Planned, certificate: Certificate | None, files: Sequence
         axes.axis("off")
         _paint(axes, planned, content, view)
         _legend(figure, planned, content)
-        figure.text(0.5, 1.0 - 0.22 / whole, _title(planned, certificate), fontsize=12, ha="center", va="center")
+        figure.text(
+            0.5,
+            1.0 - 0.22 / whole,
+            _title(planned, certificate),
+            fontsize=12,
+            ha="center",
+            va="center",
+            parse_math=False,
+        )
         for file in files:
-            metadata = {"CreationDate": None} if file.suffix.lower() == ".pdf" else None
-            figure.savefig(file, dpi=160, facecolor="white", metadata=metadata)
+            figure.savefig(file, dpi=DPI, facecolor="white", **OPTIONS.get(file.suffix.lower(), {}))
         plt.close(figure)
     return view
 
@@ -155,8 +171,8 @@ def _room(content: Content) -> tuple[np.ndarray, np.ndarray]:
 def _window(content: Content, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Corners (2,) [m] of what is seen: paths, frames, obstacles and the hand, with a border."""
     low, high = _room(content)
-    corners = floor_corners(low - [0.06, 0.06, 0.0], high + [0.06, 0.06, 0.0])
-    labels = 0.5 * (low + high) * [1, 1, 0] + (0.5 * (high - low) + 0.16) * [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+    corners = floor_corners(low - BORDER, high + BORDER)
+    labels = 0.5 * (low + high) + (0.5 * (high - low) + 0.16) * SIDES
     labels[:, 2] = content.floor
     shells = [solid.outline(view, 0.05) for solid in content.solids]
     tips = [f.position + TRIAD * f.rotation.T for f in content.frames]
@@ -183,94 +199,33 @@ def _paint(axes: Any, planned: Planned, content: Content, view: View) -> None:
         paint_solid(axes, view, content.solids[index], 10.0 + 0.01 * place)
     tree = planned.plan.tree
     if tree is not None:
-        _paint_tree(axes, tree, planned.plan.path, content, view)
+        paint_tree(axes, view, tree, planned.plan.path, content.solids)
     for points in (content.final, content.executed):
         if len(points):
             below = np.column_stack([points[:, :2], np.full(len(points), content.floor)])
             axes.plot(*view.flat(below).T, color=SHADOW, linewidth=2.0, alpha=0.55, zorder=3.5)
     dashed = {"linestyle": (0, (4.5, 2.2)), "linewidth": 2.1, "zorder": 31}
     _paint_line(axes, content.demonstrated, content, view, color=DEMONSTRATED, **dashed)
-    _paint_line(axes, content.final, content, view, color=FINAL, linewidth=3.4, zorder=30)
+    _paint_line(axes, content.final, content, view, color=FINAL, linewidth=3.6, zorder=30)
     if len(content.executed):
-        _paint_line(axes, content.executed, content, view, color=FREE, linewidth=2.0, zorder=32)
+        _paint_line(axes, content.executed, content, view, color=FREE, linewidth=2.4, zorder=32)
     tips = [f.position + share * TRIAD * f.rotation.T for f in content.frames for share in (0.0, 0.5, 1.0)]
     lines = view.flat(np.vstack([content.demonstrated, content.final, content.executed, *tips]))
     for pose, label in zip(content.frames, ("start", "goal"), strict=True):
         _paint_frame(axes, pose, label, view, lines)
 
 
-def _hidden(points: np.ndarray, solids: Sequence[Solid], view: View) -> np.ndarray:
-    out = np.zeros(len(points), dtype=bool)
-    for solid in solids:
-        out |= solid.hides(points, view)
-    return out
-
-
 def _paint_line(axes: Any, points: np.ndarray, content: Content, view: View, **style: Any) -> None:
     """A path, fainter where a solid is in front of it; below all paths a white border."""
     flat, middles = view.flat(points), 0.5 * (points[1:] + points[:-1])
     start = 0
-    for hidden, run in groupby(_hidden(middles, content.solids, view)):
+    for hidden, run in groupby(hidden_by(content.solids, middles, view)):
         count = len(list(run))
         piece = flat[start : start + count + 1].T
         axes.plot(*piece, alpha=HIDDEN if hidden else 1.0, solid_capstyle="round", **style)
         if not hidden:
             axes.plot(*piece, color="white", linewidth=style["linewidth"] + 1.8, alpha=0.7, zorder=29)
         start += count
-
-
-def _paint_tree(axes: Any, tree: EscapeTree, path: PosePath, content: Content, view: View) -> None:
-    """Edges, kept and rejected, and the planes along the branch that came home."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
-    positions = PosePath(tree.poses).positions
-    child = np.flatnonzero(tree.parents >= 0)
-    edges = np.stack([positions[tree.parents[child]], positions[child]], axis=1)
-    good = np.isin(tree.verdicts[child], (0, 4))
-    bad = np.flatnonzero(tree.verdicts[child] == 1)
-    bad = bad[np.unique(np.linspace(0, len(bad) - 1, min(len(bad), MOST_REJECTED)).astype(int))] if len(bad) else bad
-    for rows, color, width, alpha in ((bad, REJECTED, 0.35, 0.4), (np.flatnonzero(good), KEPT, 0.6, 0.75)):
-        if not len(rows):
-            continue
-        dim = np.where(_hidden(edges[rows].mean(axis=1), content.solids, view), HIDDEN, 1.0)
-        lines = LineCollection(list(view.flat(edges[rows])), colors=color, linewidths=width, alpha=alpha * dim)
-        lines.set_zorder(24)
-        axes.add_collection(lines)
-    squares = []
-    for k in branch_planes(tree, path):
-        plane = tree.planes[k]
-        side = 0.5 * PLANE_SIDE
-        squares.append(
-            [plane.origin + side * (a * plane.u + b * plane.v) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-        )
-    if not squares:
-        return
-    squares.sort(key=lambda square: float(view.depth(np.mean(square, axis=0))))
-    polygons = [view.flat(np.array(square)) for square in squares]
-    axes.add_collection(
-        PolyCollection(polygons, facecolors=PLANE, edgecolors=PLANE, linewidths=0.7, alpha=0.28, zorder=26)
-    )
-
-
-def branch_planes(tree: EscapeTree, path: PosePath) -> list[int]:
-    """Planes at the nodes of the branch that comes home closest to a path; of all nodes where none came home."""
-    origins = np.array([plane.origin for plane in tree.planes]).reshape(-1, 3)
-    ends = np.flatnonzero(tree.verdicts == 4)
-    positions = PosePath(tree.poses).positions
-    if not len(ends) or not len(origins):
-        return [int(k) for k in np.unique(np.linspace(0, len(origins) - 1, 14).astype(int))] if len(origins) else []
-    best: list[int] = []
-    least = math.inf
-    for end in ends[:200]:
-        branch, row = [], int(end)
-        while row >= 0:
-            branch.append(row)
-            row = int(tree.parents[row])
-        gaps = np.linalg.norm(positions[branch][:, None] - path.positions[None], axis=2).min(axis=1)
-        if gaps.mean() < least:
-            best, least = branch, float(gaps.mean())
-    gaps = np.linalg.norm(origins[:, None] - positions[best][None], axis=2)
-    return [int(k) for k in np.flatnonzero(gaps.min(axis=1) < 1e-9)]
 
 
 def _paint_frame(axes: Any, pose: Pose, label: str, view: View, lines: np.ndarray) -> None:
@@ -299,10 +254,10 @@ def _legend(figure: Any, planned: Planned, content: Content) -> None:
 
     entries: list[Any] = [
         Line2D([], [], color=DEMONSTRATED, linewidth=2.1, linestyle=(0, (4.5, 2.2)), label="demonstration"),
-        Line2D([], [], color=FINAL, linewidth=3.4, label="final path"),
+        Line2D([], [], color=FINAL, linewidth=3.6, label="final path"),
     ]
     if len(content.executed):
-        entries.append(Line2D([], [], color=FREE, linewidth=2.0, label="collision-free path"))
+        entries.append(Line2D([], [], color=FREE, linewidth=2.4, label="collision-free path"))
     if content.solids:
         entries.append(Patch(facecolor="#e9b872", edgecolor="#8a5a17", alpha=0.75, label="obstacle"))
     if any(content.shelled):

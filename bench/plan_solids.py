@@ -85,7 +85,7 @@ def _paint_union(
 
 
 def paint_floor(axes: Any, view: View, low: np.ndarray, high: np.ndarray) -> None:
-    """A grid of 0.1 m at the lower side of a box from low (3,) to high (3,) [m], its coordinates, a scale of heights."""
+    """A grid at the lower side of a box from low (3,) to high (3,) [m], its coordinates, and a scale of heights."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Polygon
 

@@ -122,7 +122,8 @@ def solid_of(shape: Shape, pose: Pose) -> Solid:
     if isinstance(shape, Cylinder):
         angle = 2.0 * np.pi * np.arange(RIM) / RIM
         ring = shape.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM)])
-        rims = [(ring + [0.0, 0.0, z]) @ turn.T + at for z in (-0.5 * shape.length, 0.5 * shape.length)]
+        half = 0.5 * shape.length * turn[:, 2]
+        rims = [ring @ turn.T + at + offset for offset in (-half, half)]
         ends = (Facet(rims[0], -turn[:, 2]), Facet(rims[1], turn[:, 2]))
         return Solid(np.vstack(rims), 0.0, _planes(np.vstack(rims)), ends, "cylinder")
     points = corner_points(shape) @ turn.T + at
@@ -168,6 +169,14 @@ def union(outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
             np.maximum(part, (y[j:m, None] - start[1]) * normal[1] + (x[None, i:k] - start[0]) * normal[0], out=part)
         np.minimum(outside[j:m, i:k], part, out=outside[j:m, i:k])
     return [np.array(line) for line in contour_generator(x, y, outside).lines(0.0)]
+
+
+def hidden_by(solids: Sequence[Solid], points: np.ndarray, view: View) -> np.ndarray:
+    """(n,) whether any solid hides points (n, 3)."""
+    out = np.zeros(len(points), dtype=bool)
+    for solid in solids:
+        out |= solid.hides(points, view)
+    return out
 
 
 def back_to_front(solids: Sequence[Solid], view: View) -> list[int]:

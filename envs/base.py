@@ -107,7 +107,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         """Act for one control step.
 
         Raises:
-            BadAction: wrong shape, or not finite.
+            BadAction: not an array of real numbers, of the wrong shape, or not finite.
         """
         self._take(action)
         if self.control_mode == "joint_velocity":
@@ -159,10 +159,10 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
 
     def _step_twists(self) -> int:
         """Step with tcp twists in world axes, made joint speeds by damped least squares."""
-        rows = np.clip(self._action, -1.0, 1.0).reshape(len(self.arms), -1)
-        finite = np.isfinite(rows).ravel()
+        finite = np.isfinite(self._action)
         if not finite.all():
             return int(np.argmin(finite))
+        rows = np.clip(self._action, -1.0, 1.0).reshape(len(self.arms), -1)
         speeds = np.column_stack([self._resolved(rows), rows[:, -1]])
         return self.sim.step(speeds.ravel(), np.ones_like(self._speed_limits), math.inf, self.substeps)
 

@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 
 from . import screw
-from .jit import inner, kernel
-from .proximity import FAR, between_segments, closest, distance
+from .jit import inlined, inner, kernel
+from .proximity import FAR, between_segments, closest, distance, is_beyond
 from .robot_work import (
     AFTER,
     ARMS,
+    B_BALL,
     B_FRAME,
     B_RADIUS,
     BEFORE,
@@ -34,7 +35,8 @@ from .robot_work import (
     PART,
     SETTINGS,
     SLIDING,
-    VERTICES,
+    W_ALL,
+    W_CENTER,
     W_REACH,
     WORLD,
     end_a,
@@ -50,22 +52,41 @@ REFINEMENTS = 5
 """A step is looked at in up to 2^5 parts before it is held not to be clear."""
 
 
-@kernel
+@inlined
 def shifted(g, k, p, seconds):
     """World point as obstacle k will see it after some seconds: less the obstacle's own way."""
     o = OBSTACLES + k
     return (p[0] - seconds * g[o, 17], p[1] - seconds * g[o, 18], p[2] - seconds * g[o, 19])
 
 
-@kernel
+@inlined
+def capsule_beyond(g, world, c, k, seconds, cutoff):
+    """True if capsule c surely is farther from obstacle k than the cutoff, after some seconds: by balls about both."""
+    row = world + c
+    center = shifted(g, k, (g[row, W_CENTER], g[row, W_CENTER + 1], g[row, W_CENTER + 2]), seconds)
+    return is_beyond(g, OBSTACLES + k, center, cutoff + g[BODY + c, B_BALL])
+
+
+@inlined
 def obstacle_distance(g, world, c, k, seconds, cutoff):
-    """Distance [m] of capsule c, at the rows from `world` on, from obstacle k after some seconds; FAR beyond."""
+    """Distance [m] of capsule c, at the rows from `world` on, from obstacle k after some seconds.
+
+    FAR instead if it is surely more than the cutoff.
+    """
+    if capsule_beyond(g, world, c, k, seconds, cutoff):
+        return FAR
     a, b = shifted(g, k, end_a(g, world + c), seconds), shifted(g, k, end_b(g, world + c), seconds)
-    radius, vertices = g[BODY + c, B_RADIUS], g[int(g[HEADER, VERTICES]) :]
-    return distance(g[OBSTACLES:], k, vertices, a, b, cutoff + radius) - radius
+    return distance(g, OBSTACLES + k, g, a, b) - g[BODY + c, B_RADIUS]
 
 
-@kernel
+@inlined
+def all_beyond(g, world, k, seconds, cutoff):
+    """True if all capsules that move surely are farther from obstacle k than the cutoff, after some seconds."""
+    center = shifted(g, k, (g[world, W_ALL], g[world, W_ALL + 1], g[world, W_ALL + 2]), seconds)
+    return is_beyond(g, OBSTACLES + k, center, cutoff + g[world, W_ALL + 3])
+
+
+@inlined
 def capsule_distance(g, world, i, j):
     """Distance [m] between two capsules of the robot."""
     length = between_segments(end_a(g, world + i), end_b(g, world + i), end_a(g, world + j), end_b(g, world + j))[0]
@@ -76,12 +97,12 @@ def capsule_distance(g, world, i, j):
 def least_room(g, world, seconds, cutoff):
     """Smallest room [m] of all pairs with the capsules at the rows from `world` on; at most the cutoff."""
     least = cutoff
-    for c in range(int(g[HEADER, N_CAPSULES])):
-        if g[BODY + c, B_FRAME] < 0.0:
+    for k in range(int(g[HEADER, N_OBSTACLES])):
+        keep = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, world, k, seconds, least + keep):
             continue
-        for k in range(int(g[HEADER, N_OBSTACLES])):
-            if not may_touch(g, k, c):
-                keep = g[OBSTACLES + k, MARGIN]
+        for c in range(int(g[HEADER, N_CAPSULES])):
+            if g[BODY + c, B_FRAME] >= 0.0 and not may_touch(g, k, c):
                 least = min(least, obstacle_distance(g, world, c, k, seconds, least + keep) - keep)
     first = int(g[HEADER, PAIRS])
     for p in range(first, first + int(g[HEADER, N_PAIRS])):
@@ -108,15 +129,18 @@ def _note(g, row, kind, i, j, gap, keep, normal, t, s):
 def find_near(g, shell):
     """Collect the pairs with a distance below the shell, capsules placed at WORLD; returns the smallest room."""
     row, first, least = int(g[HEADER, NEAR]), int(g[HEADER, NEAR]), FAR
-    vertices = g[int(g[HEADER, VERTICES]) :]
-    for c in range(int(g[HEADER, N_CAPSULES])):
-        if g[BODY + c, B_FRAME] < 0.0:
+    for k in range(int(g[HEADER, N_OBSTACLES])):
+        if all_beyond(g, WORLD, k, 0.0, shell):
             continue
-        for k in range(int(g[HEADER, N_OBSTACLES])):
-            if may_touch(g, k, c) or obstacle_distance(g, WORLD, c, k, 0.0, shell) > shell:
+        for c in range(int(g[HEADER, N_CAPSULES])):
+            if g[BODY + c, B_FRAME] < 0.0 or may_touch(g, k, c):
                 continue
-            gap, t, normal = closest(g[OBSTACLES:], k, vertices, end_a(g, WORLD + c), end_b(g, WORLD + c))
+            if capsule_beyond(g, WORLD, c, k, 0.0, shell):
+                continue
+            gap, t, normal = closest(g, OBSTACLES + k, g, end_a(g, WORLD + c), end_b(g, WORLD + c))
             gap -= g[BODY + c, B_RADIUS]
+            if gap > shell:
+                continue
             _note(g, row, 0.0, c, k, gap, g[OBSTACLES + k, MARGIN], normal, t, 0.0)
             least, row = min(least, gap - g[OBSTACLES + k, MARGIN]), row + 1
     pair = int(g[HEADER, PAIRS])
@@ -143,7 +167,7 @@ def _lever(g, joint, p):
 
 
 @kernel
-def bound_motion(g, world, sliding, step):
+def bound_motion(g, world, step):
     """Longest way [m] of any point of each capsule during a joint step, into column W_REACH of its world row.
 
     A joint moves a point by its angle times the point's distance from the axis, and only joints after it change
@@ -156,7 +180,7 @@ def bound_motion(g, world, sliding, step):
         a, b = end_a(g, world + c), end_b(g, world + c)
         for joint in range(frame, first - 1, -1):
             if step[joint] != 0.0:
-                if sliding[joint] == 1.0:
+                if g[SLIDING, joint] == 1.0:
                     way += abs(step[joint])
                 else:
                     way += abs(step[joint]) * (max(_lever(g, joint, a), _lever(g, joint, b)) + way)
@@ -186,8 +210,7 @@ def _look(g, row, world, seconds):
     if g[row, KIND] == 1.0:
         length, _, _, normal = between_segments(a, b, end_a(g, world + j), end_b(g, world + j))
         return length - g[BODY + i, B_RADIUS] - g[BODY + j, B_RADIUS], normal
-    vertices = g[int(g[HEADER, VERTICES]) :]
-    gap, _, normal = closest(g[OBSTACLES:], j, vertices, shifted(g, j, a, seconds), shifted(g, j, b, seconds))
+    gap, _, normal = closest(g, OBSTACLES + j, g, shifted(g, j, a, seconds), shifted(g, j, b, seconds))
     return gap - g[BODY + i, B_RADIUS], normal
 
 
@@ -235,7 +258,7 @@ def _pair_stays_clear(g, row, keep, turning, start, dt):
 def _part_is_clear(g, q, step, start, dt):
     """True if all near pairs stay clear during a part of a step; leaves the capsules at its end in NEXT."""
     place_capsules(g, q, WORLD)
-    bound_motion(g, WORLD, g[SLIDING], step)
+    bound_motion(g, WORLD, step)
     turning = 0.0
     for i in range(len(q)):
         turning += abs(step[i])
@@ -253,7 +276,7 @@ def _part_is_clear(g, q, step, start, dt):
 @kernel
 def reach_of(g, step, dt):
     """Distance [m] beyond which no pair can come closer than it must keep during the step; capsules at WORLD."""
-    bound_motion(g, WORLD, g[SLIDING], step)
+    bound_motion(g, WORLD, step)
     way, fastest, keep = 0.0, 0.0, g[SETTINGS, SELF_MARGIN]
     for c in range(int(g[HEADER, N_CAPSULES])):
         way = max(way, g[WORLD + c, W_REACH])

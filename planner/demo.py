@@ -131,13 +131,10 @@ class Demonstration:
 
     def _check_objects(self, key: str, segment: Segment) -> None:
         """The objects that a segment names must be known, where any are, and not in another unit."""
-        known = ("", *self.object_sizes)
-        for role in ("reference", "held"):
-            if self.object_sizes and getattr(segment, role) not in known:
+        for role, name in (("reference", segment.reference), ("held", segment.held)):
+            if self.object_sizes and name not in ("", *self.object_sizes):
                 allowed = ", ".join(self.object_sizes)
-                raise self._bad(
-                    key, f"{role} {getattr(segment, role)!r} is not in object_names; allowed: {allowed}, ''"
-                )
+                raise self._bad(key, f"{role} {name!r} is not in object_names; allowed: {allowed}, ''")
         farthest = float(np.abs(segment.reference_pose.position).max())
         if farthest > FARTHEST:
             raise self._bad(key, f"the reference pose is {farthest:.4g} m away; is it in cm or mm?")

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import screw
-from .clearance import FIRST, GAP, KEEP, NORMAL, OTHER, find_near, least_room, obstacle_distance
-from .jit import inner, kernel
+from .clearance import FIRST, GAP, KEEP, NORMAL, OTHER, all_beyond, find_near, least_room, obstacle_distance
+from .jit import inlined, inner, kernel
 from .proximity import closest
 from .robot_work import (
     B_A,
@@ -34,11 +34,11 @@ from .robot_work import (
     NEAR,
     NEXT,
     OBSTACLES,
-    VERTICES,
     W_REACH,
     WORLD,
     end_a,
     end_b,
+    lay_capsules,
     may_touch,
     place_frames,
     robot_work,
@@ -60,11 +60,11 @@ def tool_work(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = ()
     """
     work = robot_work((), (), packed, masks=masks, margin=margin, most_near=len(capsules) * len(packed.rows))
     work[HEADER, N_CAPSULES] = len(capsules)
-    work[BODY : BODY + len(capsules), B_A : B_RADIUS + 1] = capsules
+    lay_capsules(work[BODY : BODY + len(capsules)], capsules)
     return work
 
 
-@kernel
+@inlined
 def place_tool(g, x, world):
     """The tool's capsules at the pose x (a tuple of 8) into the rows from `world` on."""
     p = screw.translation(x)
@@ -82,7 +82,7 @@ def tool_room(g, x, cutoff):
     return least_room(g, NEXT, 0.0, cutoff)
 
 
-@inner
+@inlined
 def _moved(p, delta, s):
     return (p[0] + s * delta[0], p[1] + s * delta[1], p[2] + s * delta[2])
 
@@ -92,9 +92,8 @@ def _pair_slides_clear(g, c, k, delta, keep, s):
     """True if capsule c, placed at WORLD, keeps its distance from obstacle k on a slide from fraction s on."""
     a, b, radius = end_a(g, WORLD + c), end_b(g, WORLD + c), g[BODY + c, B_RADIUS]
     length = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
-    vertices = g[int(g[HEADER, VERTICES]) :]
     for _ in range(64):
-        gap, _, n = closest(g[OBSTACLES:], k, vertices, _moved(a, delta, s), _moved(b, delta, s))
+        gap, _, n = closest(g, OBSTACLES + k, g, _moved(a, delta, s), _moved(b, delta, s))
         room = gap - radius - keep
         if room < 0.0:
             return False
@@ -107,7 +106,7 @@ def _pair_slides_clear(g, c, k, delta, keep, s):
     return False
 
 
-@kernel
+@inlined
 def slide_is_clear(g, delta):
     """True if the tool, placed at WORLD with its near pairs found within the slide's length, slides clear."""
     first = int(g[HEADER, NEAR])
@@ -141,20 +140,21 @@ def point_speeds(g, twist):
 
 
 @inner
-def _stretch(g, left):
+def _stretch(g, left, fastest):
     """Fraction of the screw that is proven clear from the tool at NEXT on; -1 if it is too close already."""
     stretch = left
-    for c in range(int(g[HEADER, N_CAPSULES])):
-        speed = g[WORLD + c, W_REACH]
-        for k in range(int(g[HEADER, N_OBSTACLES])):
-            if may_touch(g, k, c):
-                continue
-            keep = g[OBSTACLES + k, MARGIN]
-            room = obstacle_distance(g, NEXT, c, k, 0.0, keep + stretch * speed) - keep
-            if room < 0.0:
-                return -1.0
-            if room < stretch * speed:
-                stretch = room / speed
+    for k in range(int(g[HEADER, N_OBSTACLES])):
+        keep = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, NEXT, k, 0.0, keep + stretch * fastest):
+            continue
+        for c in range(int(g[HEADER, N_CAPSULES])):
+            speed = g[WORLD + c, W_REACH]
+            if not may_touch(g, k, c):
+                room = obstacle_distance(g, NEXT, c, k, 0.0, keep + stretch * speed) - keep
+                if room < 0.0:
+                    return -1.0
+                if room < stretch * speed:
+                    stretch = room / speed
     return stretch
 
 
@@ -169,7 +169,7 @@ def screw_is_clear(g, x, y):
     s = 0.0
     for _ in range(2000):
         place_tool(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), NEXT)
-        stretch = _stretch(g, 1.0 - s)
+        stretch = _stretch(g, 1.0 - s, fastest)
         if stretch < 0.0:
             return False
         s += stretch

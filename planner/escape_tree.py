@@ -18,8 +18,8 @@ import numpy as np
 
 from . import screw
 from .clearance import GAP, KEEP, NORMAL, find_near
-from .edges import edge_is_clear, place_tool, screw_is_clear, tool_room
-from .jit import inner, kernel
+from .edges import edge_is_clear, place_tool, screw_is_clear, slide_is_clear, tool_room
+from .jit import inlined, inner, kernel
 from .robot_work import HEADER, N_NEAR, NEAR, WORLD
 from .tangent import SIDES, child_direction, plane_basis
 
@@ -59,48 +59,48 @@ ON_SHELL, SPACING, SHORTCUT, CANDIDATES, OPTIONS = 28, 29, 30, 31, 32
 """Columns of the settings, see `repet.RepetSettings`."""
 
 
-@inner
+@inlined
 def _shifted(x, delta):
     """The pose moved by a world vector, turned by nothing."""
     p = screw.translation(x)
     return screw.from_pose((p[0] + delta[0], p[1] + delta[1], p[2] + delta[2]), (x[0], x[1], x[2], x[3]))
 
 
-@inner
-def _cell(x, size, cells):
-    """Slot of a pose in the table of visited cells: (slot, key)."""
-    p = screw.translation(x)
+@inlined
+def _attitude_key(x):
+    """A number for the orientation of a pose, the same for nearly the same ones."""
     sign = 1.0 if x[0] >= 0.0 else -1.0
-    key = 17.0
-    for value in (p[0] / size, p[1] / size, p[2] / size, sign * x[1] * 5.0, sign * x[2] * 5.0, sign * x[3] * 5.0):
-        key = (key * 31.0 + math.floor(value + 0.5) + 1e6) % 1e9
-    return int(key) % len(cells), key
+    key = 17
+    for value in (sign * x[1], sign * x[2], sign * x[3]):
+        key = key * 31 + math.floor(5.0 * value + 0.5) + 8
+    return key
 
 
-@inner
-def _visited(x, size, cells):
-    """True if a kept pose lies in the same cell; else the cell is marked."""
-    slot, key = _cell(x, size, cells)
+@inlined
+def _visited(p, attitude, size, cells):
+    """True if a kept pose lies in the same cell as the position p with its attitude; else the cell is marked."""
+    x, y, z = math.floor(p[0] / size), math.floor(p[1] / size), math.floor(p[2] / size)
+    number = ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791) ^ (attitude * 2654435761)) & 0x7FFFFFFF
+    slot, key = number % len(cells), float(number)
     for _ in range(len(cells)):
         if cells[slot] == key:
             return True
         if cells[slot] < 0.0:
             cells[slot] = key
             return False
-        slot = (slot + 1) % len(cells)
+        slot = slot + 1 if slot + 1 < len(cells) else 0
     return True
 
 
-@inner
-def _outside(x, options):
-    p = screw.translation(x)
+@inlined
+def _outside(p, options):
     outside = False
     for k in range(3):
         outside |= p[k] < options[LOWEST + k] or p[k] > options[HIGHEST + k]
     return outside
 
 
-@kernel
+@inlined
 def lay_plane(g, tree, row, towards, options, step):
     """Find the obstacle closest to a node and lay the plane through it; the tool is left at WORLD, near pairs found."""
     x = screw.load8(tree, row)
@@ -122,18 +122,7 @@ def lay_plane(g, tree, row, towards, options, step):
     return normal, u, v
 
 
-@inner
-def _score(x, length, goal, options):
-    """Cost of a node: way so far plus way home (the paper: only the latter), and what the bias asks for."""
-    p, q = screw.translation(x), screw.translation(goal)
-    home, angle = screw.gap(x, goal)
-    cost = math.hypot(home, 0.2 * angle) + (0.0 if options[GOAL_COST] == 1.0 else length)
-    for k in range(3):
-        cost -= options[BIAS + k] * (p[k] - q[k])
-    return cost
-
-
-@inner
+@inlined
 def _add_node(tree, row, x, parent, verdict, length, score):
     screw.store8(tree, row, x)
     tree[row, PARENT], tree[row, VERDICT] = parent, verdict
@@ -151,21 +140,77 @@ def _turned(x, axis, angle):
     return screw.from_pose(screw.translation(x), r)
 
 
+@inlined
+def _judge(g, tree, row, count, y, p, clear, way, home, goal, cells, options, step, attitude):
+    """Append a child at pose y, position p, with the verdict on it."""
+    verdict = KEPT
+    if _outside(p, options):
+        verdict = OUTSIDE
+    elif not clear:
+        verdict = REJECTED_EDGE
+    elif _visited(p, attitude, options[CELL] * step, cells):
+        verdict = VISITED
+    length = tree[row, LENGTH] + way
+    cost = home + (0.0 if options[GOAL_COST] == 1.0 else length)
+    for k in range(3):
+        cost -= options[BIAS + k] * (p[k] - goal[k])
+    _add_node(tree, count, y, row, verdict, length, cost)
+
+
 @inner
-def _child(k, x, normal, u, v, goal, options, step, state):
-    """Pose of child k of a node: moved in the plane, or turned about one of the plane's axes."""
-    moves = SIDES + int(options[RANDOM])
-    if k >= moves:
-        axis = (normal, u, v)[(k - moves) // 2]
-        return _turned(x, axis, options[TURN] if k % 2 == 0 else -options[TURN])
-    d = child_direction(k, normal, u, v, options[SQUARE], options[AWAY], state)
-    y = _shifted(x, (step * d[0], step * d[1], step * d[2]))
-    if options[SPREAD] == 1.0:
-        # the orientation on the screw home, in proportion to the way made
-        home = screw.gap(x, goal)[0]
-        part = screw.sclerp(x, goal, min(1.0, step / max(home + step, 1e-9)))
-        y = screw.from_pose(screw.translation(y), (part[0], part[1], part[2], part[3]))
-    return y
+def _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state):
+    """Children that keep their parent's orientation, and so all that hangs on it; the new number of rows."""
+    normal, u, v = plane
+    p, q, attitude = screw.translation(x), screw.translation(goal), _attitude_key(x)
+    turn, r = 0.2 * screw.gap(x, goal)[1], (x[0], x[1], x[2], x[3])
+    for k in range(SIDES + int(options[RANDOM])):
+        if count >= len(tree):
+            break
+        d = child_direction(k, normal, u, v, options[SQUARE], options[AWAY], state)
+        delta = (step * d[0], step * d[1], step * d[2])
+        end = (p[0] + delta[0], p[1] + delta[1], p[2] + delta[2])
+        way = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
+        x_, y_, z_ = q[0] - end[0], q[1] - end[1], q[2] - end[2]
+        home = math.sqrt(x_ * x_ + y_ * y_ + z_ * z_ + turn * turn)
+        clear = slide_is_clear(g, delta)
+        _judge(g, tree, row, count, screw.from_pose(end, r), end, clear, way, home, q, cells, options, step, attitude)
+        count += 1
+    return count
+
+
+@inner
+def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state):
+    """Children that turn on the way home, are pulled back to the shell, or turn where they are."""
+    normal, u, v = plane
+    q, moves = screw.translation(goal), SIDES + int(options[RANDOM])
+    first = 0 if options[SPREAD] == 1.0 or options[PULL] == 1.0 else moves
+    for k in range(first, moves + (6 if options[TURN] > 0.0 else 0)):
+        if count >= len(tree):
+            break
+        if k >= moves:
+            y = _turned(x, (normal, u, v)[(k - moves) // 2], options[TURN] if k % 2 == 0 else -options[TURN])
+        else:
+            d = child_direction(k, normal, u, v, options[SQUARE], options[AWAY], state)
+            y = _shifted(x, (step * d[0], step * d[1], step * d[2]))
+            if options[SPREAD] == 1.0:
+                y = _turned_home(x, y, goal, step)
+            elif k < SIDES:
+                y = _pulled(g, x, y, normal, options)
+        way, angle = screw.gap(x, y)
+        home, left = screw.gap(y, goal)
+        clear = edge_is_clear(g, x, y)
+        _judge(g, tree, row, count, y, screw.translation(y), clear, math.hypot(way, 0.2 * angle),
+               math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(y))  # fmt: skip
+        count += 1
+    return count
+
+
+@inner
+def _turned_home(x, y, goal, step):
+    """The pose y with the orientation on the screw from x to the goal, in proportion to the way made."""
+    home = screw.gap(x, goal)[0]
+    part = screw.sclerp(x, goal, min(1.0, step / max(home + step, 1e-9)))
+    return screw.from_pose(screw.translation(y), (part[0], part[1], part[2], part[3]))
 
 
 @inner
@@ -183,25 +228,11 @@ def expand(g, tree, row, count, goal, cells, options, step, state):
     """Give a node its children; returns the new number of rows of the tree."""
     x, towards = screw.load8(tree, row), screw.translation(goal)
     p = screw.translation(x)
-    normal, u, v = lay_plane(g, tree, row, (towards[0] - p[0], towards[1] - p[1], towards[2] - p[2]), options, step)
-    turns = 6 if options[TURN] > 0.0 else 0
-    for k in range(SIDES + int(options[RANDOM]) + turns):
-        if count >= len(tree):
-            return count
-        y = _child(k, x, normal, u, v, goal, options, step, state)
-        if options[PULL] == 1.0 and k < SIDES:
-            y = _pulled(g, x, y, normal, options)
-        way, angle = screw.gap(x, y)
-        length = tree[row, LENGTH] + math.hypot(way, 0.2 * angle)
-        verdict = KEPT
-        if _outside(y, options):
-            verdict = OUTSIDE
-        elif not edge_is_clear(g, x, y):
-            verdict = REJECTED_EDGE
-        elif _visited(y, options[CELL] * step, cells):
-            verdict = VISITED
-        _add_node(tree, count, y, row, verdict, length, _score(y, length, goal, options))
-        count += 1
+    plane = lay_plane(g, tree, row, (towards[0] - p[0], towards[1] - p[1], towards[2] - p[2]), options, step)
+    if options[SPREAD] != 1.0 and options[PULL] != 1.0:
+        count = _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state)
+    if options[SPREAD] == 1.0 or options[PULL] == 1.0 or options[TURN] > 0.0:
+        count = _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state)
     return count
 
 
@@ -260,8 +291,9 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
     for k in range(len(used)):
         used[k] = 0.0
     x = (root[0], root[1], root[2], root[3], root[4], root[5], root[6], root[7])
-    _add_node(tree, 0, x, -1, KEPT, 0.0, _score(x, 0.0, goal, options))
-    _visited(x, options[CELL] * step, cells)
+    home, turn = screw.gap(x, goal)
+    _add_node(tree, 0, x, -1, KEPT, 0.0, math.hypot(home, 0.2 * turn))
+    _visited(screw.translation(x), _attitude_key(x), options[CELL] * step, cells)
     count, size = 1, _push(heap, 0, tree[0, SCORE], 0)
     while size > 0 and count < min(len(tree), int(options[MOST])):
         row = _pop(heap, size)

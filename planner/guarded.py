@@ -4,10 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from .controller import tick
 from .jit import kernel
 from .pursuit import FOLLOWING, STALLED, pursue
+from .robot_work import DESIRED
 from .safety import BLOCKED, FREE, safe_velocity
 from .workspace import LIMITS
+
+
+@kernel
+def safe_tick(work, g, q, target, sign, dt, out):
+    """One control step towards a pose (8,), safe: speeds into `out` (dof,); the way round taken.
+
+    `controller.tick` and the safety layer in one call.
+    """
+    wish = g[DESIRED]
+    sign = tick(work, q, target, sign, wish[: len(q)])
+    safe_velocity(g, q, wish[: len(q)], dt, out)
+    return sign
 
 
 @kernel

@@ -82,6 +82,11 @@ def inner(function: Callable[..., Any]) -> Any:
     return _compiled(function, {"no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
 
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a short function into every kernel that calls it: handing arrays to a call costs more than it does."""
+    return _compiled(function, {"forceinline": True})
+
+
 def _compiled(function: Callable[..., Any], options: dict[str, bool]) -> Any:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))

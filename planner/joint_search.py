@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from .clearance import SELF_MARGIN, bound_motion, capsule_distance, obstacle_distance, room_at
+from .clearance import SELF_MARGIN, all_beyond, bound_motion, capsule_distance, obstacle_distance, room_at
 from .jit import inner, kernel
 from .robot_work import (
     AFTER,
@@ -24,7 +24,6 @@ from .robot_work import (
     PAIRS,
     PART,
     SETTINGS,
-    SLIDING,
     W_REACH,
     WORLD,
     may_touch,
@@ -39,20 +38,21 @@ SMALLEST = 1e-4
 @inner
 def _clear_stretch(g):
     """Fraction of a step, up to 1, that is proven clear from WORLD on, given the ways in W_REACH; -1 if too close."""
-    stretch = 1.0
+    stretch, longest = 1.0, 0.0
     for c in range(int(g[HEADER, N_CAPSULES])):
-        way = g[WORLD + c, W_REACH]
-        if g[BODY + c, B_FRAME] < 0.0:
+        longest = max(longest, g[WORLD + c, W_REACH])
+    for k in range(int(g[HEADER, N_OBSTACLES])):
+        keep = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, WORLD, k, 0.0, keep + stretch * longest):
             continue
-        for k in range(int(g[HEADER, N_OBSTACLES])):
-            if may_touch(g, k, c):
-                continue
-            keep = g[OBSTACLES + k, MARGIN]
-            room = obstacle_distance(g, WORLD, c, k, 0.0, keep + stretch * way) - keep
-            if room < 0.0:
-                return -1.0
-            if room < stretch * way:
-                stretch = room / way
+        for c in range(int(g[HEADER, N_CAPSULES])):
+            if g[BODY + c, B_FRAME] >= 0.0 and not may_touch(g, k, c):
+                way = g[WORLD + c, W_REACH]
+                room = obstacle_distance(g, WORLD, c, k, 0.0, keep + stretch * way) - keep
+                if room < 0.0:
+                    return -1.0
+                if room < stretch * way:
+                    stretch = room / way
     first = int(g[HEADER, PAIRS])
     for p in range(first, first + int(g[HEADER, N_PAIRS])):
         i, j = int(g[p, 0]), int(g[p, 1])
@@ -80,7 +80,7 @@ def joint_edge_is_clear(g, start, end):
             at[i] = start[i] + s * (end[i] - start[i])
             part[i] = (1.0 - s) * (end[i] - start[i])
         place_capsules(g, at[:n], WORLD)
-        bound_motion(g, WORLD, g[SLIDING], part)
+        bound_motion(g, WORLD, part)
         stretch = _clear_stretch(g)
         if stretch < 0.0:
             return False

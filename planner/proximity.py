@@ -11,19 +11,19 @@ from __future__ import annotations
 import math
 
 from .gjk import segment_polytope
-from .jit import inner, kernel
+from .jit import inlined, inner, kernel
 
 FAR = 1e30
 """Distance that is returned for what is beyond the cutoff."""
 
 
-@kernel
+@inlined
 def clamped(x, low, high):
     """Number x moved into [low, high]."""
     return min(max(x, low), high)
 
 
-@inner
+@inlined
 def _into(rows, k, p):
     """World point in the obstacle's frame."""
     x, y, z = p[0] - rows[k, 2], p[1] - rows[k, 3], p[2] - rows[k, 4]
@@ -34,7 +34,7 @@ def _into(rows, k, p):
     )
 
 
-@inner
+@inlined
 def _turned(rows, k, v):
     """Direction in the obstacle's frame as a world direction."""
     return (
@@ -44,38 +44,39 @@ def _turned(rows, k, v):
     )
 
 
-@inner
-def _point_on_segment(p, d):
-    """Parameter of the point of `p + t d` that is nearest to the origin."""
+@inlined
+def _from_ball(rows, k, a, b):
+    """Parameter of the segment's point nearest to a ball's center, and the vector from there, in the world."""
+    p = (a[0] - rows[k, 2], a[1] - rows[k, 3], a[2] - rows[k, 4])
+    d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
     length = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    if length == 0.0:
-        return 0.0
-    return clamped(-(p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) / length, 0.0, 1.0)
+    t = 0.0
+    if length > 0.0:
+        t = clamped(-(p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) / length, 0.0, 1.0)
+    return t, (p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2])
 
 
-@inner
-def _segments(p, d, half):
-    """Parameters of the closest points of `p + t d` and the z axis between +- half (Ericson 2005, 5.1.9)."""
-    a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    # the second segment starts at z = -half and runs along z
-    z = p[2] + half
-    e = 4.0 * half * half
-    f = 2.0 * half * z
-    c = p[0] * d[0] + p[1] * d[1] + z * d[2]
-    b = 2.0 * half * d[2]
-    if a <= 1e-18:
-        return 0.0, clamped(f / e, 0.0, 1.0)
-    determinant = a * e - b * b
-    t = clamped((b * f - c * e) / determinant, 0.0, 1.0) if determinant > 1e-14 * a * e else 0.0
-    s = (b * t + f) / e
-    if s < 0.0:
-        return clamped(-c / a, 0.0, 1.0), 0.0
-    if s > 1.0:
-        return clamped((b - c) / a, 0.0, 1.0), 1.0
-    return t, s
+@inlined
+def _from_capsule(rows, k, a, b):
+    """Parameter of the segment's point nearest to a capsule's core, and the vector from there, in the world.
+
+    The core's points are `center + s axis`, s within the half length (Ericson 2005, 5.1.9, with a unit axis).
+    """
+    axis, h = (rows[k, 7], rows[k, 10], rows[k, 13]), rows[k, 16]
+    p = (a[0] - rows[k, 2], a[1] - rows[k, 3], a[2] - rows[k, 4])
+    d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    dd = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    da = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
+    pd = p[0] * d[0] + p[1] * d[1] + p[2] * d[2]
+    pa = p[0] * axis[0] + p[1] * axis[1] + p[2] * axis[2]
+    square = dd - da * da
+    t = clamped((da * pa - pd) / square, 0.0, 1.0) if square > 1e-14 * dd else 0.0
+    s = clamped(pa + t * da, -h, h)
+    t = clamped((s * da - pd) / dd, 0.0, 1.0) if dd > 0.0 else 0.0
+    return t, (p[0] + t * d[0] - s * axis[0], p[1] + t * d[1] - s * axis[1], p[2] + t * d[2] - s * axis[2])
 
 
-@inner
+@inlined
 def _excess(x, half):
     """How far x is beyond [-half, half]."""
     return x - clamped(x, -half, half)
@@ -157,31 +158,35 @@ def _way_out(rows, k, x, y, z):
     return (x / length, y / length, z / length)
 
 
+@inlined
+def _from_box(rows, k, a, b):
+    """Parameter of the segment's point nearest to a box, and the vector from there, in the box's frame."""
+    p, q = _into(rows, k, a), _into(rows, k, b)
+    d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
+    t = _segment_box(p, d, rows[k, 14], rows[k, 15], rows[k, 16])
+    x, y, z = p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
+    return t, (_excess(x, rows[k, 14]), _excess(y, rows[k, 15]), _excess(z, rows[k, 16]))
+
+
 @inner
-def _local(rows, k, vertices, p, d):
-    """In the obstacle's frame: parameter t of `p + t d`, and the vector from the nearest core point to that point."""
-    kind = rows[k, 0]
-    if kind == 0.0:
-        t = _point_on_segment(p, d)
-        return t, (p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]), -1.0
-    if kind == 2.0:
-        t = _segment_box(p, d, rows[k, 14], rows[k, 15], rows[k, 16])
-        x, y, z = p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
-        return t, (_excess(x, rows[k, 14]), _excess(y, rows[k, 15]), _excess(z, rows[k, 16])), -1.0
-    if kind == 1.0:
-        t, s = _segments(p, d, rows[k, 16])
-        z = p[2] + t * d[2] - (2.0 * s - 1.0) * rows[k, 16]
-        return t, (p[0] + t * d[0], p[1] + t * d[1], z), -1.0
-    if kind == 3.0:
+def _from_other(rows, k, vertices, a, b):
+    """The same for a cylinder or a mesh; and the distance that is proven, negative if the vector's length is it."""
+    p, q = _into(rows, k, a), _into(rows, k, b)
+    if rows[k, 0] == 3.0:
+        d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
         t = _segment_cylinder(p, d, rows[k, 14], rows[k, 16])
         x, y, z = p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
         return t, _cylinder_excess(x, y, z, rows[k, 14], rows[k, 16]), -1.0
-    end = (p[0] + d[0], p[1] + d[1], p[2] + d[2])
-    proven, t, v = segment_polytope(p, end, vertices, int(rows[k, 21]), int(rows[k, 22]))
+    proven, t, v = segment_polytope(p, q, vertices, int(rows[k, 21]), int(rows[k, 22]))
     return t, v, proven
 
 
-@kernel
+@inlined
+def _length(v):
+    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+@inlined
 def closest(rows, k, vertices, a, b):
     """Closest points of the segment from a to b and obstacle k.
 
@@ -197,36 +202,45 @@ def closest(rows, k, vertices, a, b):
         rounding radius; parameter t in [0, 1] of the segment's closest point; unit normal (3) from the obstacle
         to the segment. Paper: section III-B, with the closest point instead of the shell's center.
     """
-    p = _into(rows, k, a)
-    q = _into(rows, k, b)
-    d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
-    t, v, proven = _local(rows, k, vertices, p, d)
-    length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    kind, proven = rows[k, 0], -1.0
+    if kind == 0.0:
+        t, v = _from_ball(rows, k, a, b)
+    elif kind == 1.0:
+        t, v = _from_capsule(rows, k, a, b)
+    elif kind == 2.0:
+        t, v = _from_box(rows, k, a, b)
+    else:
+        t, v, proven = _from_other(rows, k, vertices, a, b)
+    length = _length(v)
     if length > 1e-12:
         unit = (v[0] / length, v[1] / length, v[2] / length)
+        normal = unit if kind <= 1.0 else _turned(rows, k, unit)
     else:
-        unit = _way_out(rows, k, p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2])
-    if proven >= 0.0:
-        length = proven
-    return length - rows[k, 1], t, _turned(rows, k, unit)
+        p = _into(rows, k, (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])))
+        normal = _turned(rows, k, _way_out(rows, k, p[0], p[1], p[2]))
+    return (proven if proven >= 0.0 else length) - rows[k, 1], t, normal
 
 
-@kernel
-def distance(rows, k, vertices, a, b, cutoff):
-    """Distance [m] of the segment from obstacle k, or FAR if it is surely more than the cutoff."""
-    x = 0.5 * (a[0] + b[0]) - rows[k, 2]
-    y = 0.5 * (a[1] + b[1]) - rows[k, 3]
-    z = 0.5 * (a[2] + b[2]) - rows[k, 4]
-    u, v, w = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    reach = cutoff + rows[k, 20] + 0.5 * math.sqrt(u * u + v * v + w * w)
-    if x * x + y * y + z * z > reach * reach:
-        return FAR
-    p = _into(rows, k, a)
-    q = _into(rows, k, b)
-    _, away, proven = _local(rows, k, vertices, p, (q[0] - p[0], q[1] - p[1], q[2] - p[2]))
-    if proven >= 0.0:
-        return proven - rows[k, 1]
-    return math.sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) - rows[k, 1]
+@inlined
+def distance(rows, k, vertices, a, b):
+    """Distance [m] of the segment from obstacle k: the same number as `closest` gives."""
+    kind = rows[k, 0]
+    if kind == 0.0:
+        return _length(_from_ball(rows, k, a, b)[1]) - rows[k, 1]
+    if kind == 1.0:
+        return _length(_from_capsule(rows, k, a, b)[1]) - rows[k, 1]
+    if kind == 2.0:
+        return _length(_from_box(rows, k, a, b)[1]) - rows[k, 1]
+    _, v, proven = _from_other(rows, k, vertices, a, b)
+    return (proven if proven >= 0.0 else _length(v)) - rows[k, 1]
+
+
+@inlined
+def is_beyond(rows, k, center, reach):
+    """True if a ball about a point (3) surely stays clear of obstacle k: the test that spares most of the others."""
+    x, y, z = center[0] - rows[k, 2], center[1] - rows[k, 3], center[2] - rows[k, 4]
+    far = reach + rows[k, 20]
+    return x * x + y * y + z * z > far * far
 
 
 @kernel

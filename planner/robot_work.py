@@ -10,11 +10,13 @@ Python cheap and nothing is allocated in a loop. One per thread.
 | ARMS | per arm: first joint, joints, first row of its chain |
 | LOW, HIGH, SPEED, SLIDING | joint limits, largest speeds, 1 for a sliding joint |
 | STEP to ACTIVE | scratch of the width of the joints |
-| PREVIOUS | the speeds that were commanded last |
+| PREVIOUS, DESIRED | the speeds that were commanded last, that are wanted now |
+| LEVERS | per joint: no point that it moves is ever farther from its axis [m] |
+| SEEN | joints at the last look at everything, then the smallest room then, 1 if it counts, 1 if obstacles move |
 | TCPS | per arm: pose of its tcp |
 | CHAINS, FRAMES | see `chain`; the frame of joint j is row FRAMES + j |
-| BODY | per capsule: arm, joint whose frame it moves with (-1: none), ends in that frame, radius |
-| WORLD, NEXT | per capsule: ends in the world, half length, motion bound of a step |
+| BODY | per capsule: arm, joint whose frame it moves with (-1: none), ends in that frame, radius, ball that holds it |
+| WORLD, NEXT | per capsule: ends and center in the world, motion bound of a step; then a ball about all that move |
 | obstacles | see `shapes`; then a mask of capsules that may touch, safety distance |
 | pairs | capsules of the robot that may hit each other |
 | near | pairs that are close now, see `clearance` |
@@ -24,6 +26,7 @@ Python cheap and nothing is allocated in a loop. One per thread.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,7 +35,7 @@ from .arm import Arm
 from .body import Body
 from .chain import forward
 from .errors import BadOption
-from .jit import kernel
+from .jit import inlined, inner, kernel
 from .screw import rotate
 from .shapes import ROW, Packed
 
@@ -40,13 +43,15 @@ WIDTH = 40
 MAX_ARMS, MAX_JOINTS, MAX_CAPSULES = 2, 16, 52
 HEADER, SETTINGS, ARMS, LOW, HIGH, SPEED = 0, 1, 2, 3, 4, 5
 STEP, WISH, PART, AFTER, BEFORE, ACTIVE, PREVIOUS = 6, 7, 8, 9, 10, 11, 12
-SLIDING, TCPS, WEIGHT, CHAINS = 13, 14, 16, 32
+SLIDING, TCPS, WEIGHT, CHAINS, DESIRED, LEVERS, SEEN = 13, 14, 16, 32, 60, 61, 62
 FRAMES, BODY, WORLD, NEXT, FACTOR, OBSTACLES = 64, 84, 136, 188, 240, 272
 # columns of the header
 N_ARMS, N_JOINTS, N_CAPSULES, N_OBSTACLES, N_PAIRS, N_NEAR, PAIRS, NEAR, BOUNDS, VERTICES = range(10)
 # columns of a body row, and of a world row
-B_ARM, B_FRAME, B_A, B_B, B_RADIUS = 0, 1, 2, 5, 8
-W_A, W_B, W_HALF, W_REACH = 0, 3, 6, 7
+B_ARM, B_FRAME, B_A, B_B, B_RADIUS, B_BALL = 0, 1, 2, 5, 8, 9
+W_A, W_B, W_CENTER, W_REACH, W_ALL = 0, 3, 6, 9, 10
+# columns of SEEN
+SEEN_ROOM, SEEN_COUNTS, SEEN_MOVING = 16, 17, 18
 # further columns of an obstacle
 MASK, MARGIN = ROW, ROW + 1
 
@@ -91,7 +96,10 @@ def robot_work(
     work[HEADER, :10] = len(arms), joints, count, k, p, 0, first_pair, first_near, first_bound, first_vertex
     work[SETTINGS, : len(settings)] = settings
     _lay_arms(work, arms, bodies)
+    work[SEEN, SEEN_MOVING] = float(np.any(packed.rows[:, 17:20]))
     work[OBSTACLES:first_pair, :ROW] = packed.rows
+    # vertices lie in the same array: meshes know their rows in it
+    work[OBSTACLES:first_pair, 21] += first_vertex
     work[OBSTACLES:first_pair, MASK] = masks if len(masks) else 0
     work[OBSTACLES:first_pair, MARGIN] = np.where(packed.rows[:, 23] < 0, margin, packed.rows[:, 23])
     if p:
@@ -111,8 +119,21 @@ def _lay_arms(work: np.ndarray, arms: Sequence[Arm], bodies: Sequence[Body]) -> 
         rows = work[capsule : capsule + len(body)]
         rows[:, B_ARM] = k
         rows[:, B_FRAME] = np.where(body.rows[:, 0] < 0, -1, body.rows[:, 0] + joint)
-        rows[:, B_A : B_RADIUS + 1] = body.rows[:, 1:8]
+        lay_capsules(rows, body.rows[:, 1:8])
+        # from joint to joint, then to the farthest point of a capsule; a slide may be anywhere in its range
+        offsets = np.linalg.norm(arm.chain[:, 4:7], axis=1)
+        offsets[:-1] += np.where(arm.chain[:-1, 7] == 1.0, np.maximum(abs(arm.lower), abs(arm.upper)), 0.0)
+        extents = np.linalg.norm(body.rows[:, 1:7].reshape(-1, 2, 3), axis=2).max(axis=1) if len(body) else np.zeros(1)
+        beyond = np.append(np.cumsum(offsets[:0:-1])[::-1], 0.0)[: arm.dof]
+        levers = np.where(np.isfinite(beyond), beyond, 1e6) + extents.max()
+        work[LEVERS, columns] = np.where(arm.chain[:-1, 7] == 1.0, 1.0, levers)
         joint, chain, capsule = joint + arm.dof, chain + arm.dof + 1, capsule + len(body)
+
+
+def lay_capsules(rows: np.ndarray, capsules: np.ndarray) -> None:
+    """Write capsules (m, 7), ends and radius, into body rows."""
+    rows[:, B_A : B_RADIUS + 1] = capsules
+    rows[:, B_BALL] = 0.5 * np.linalg.norm(capsules[:, 3:6] - capsules[:, :3], axis=1) + capsules[:, 6]
 
 
 @kernel
@@ -135,34 +156,55 @@ def place_capsules(g, q, world):
 @kernel
 def place_frames(g, world):
     """Capsules at the frames as they are into the rows from `world` on."""
-    for c in range(int(g[HEADER, N_CAPSULES])):
-        frame = int(g[BODY + c, B_FRAME])
+    count = int(g[HEADER, N_CAPSULES])
+    for c in range(count):
+        frame, body, row = int(g[BODY + c, B_FRAME]), BODY + c, world + c
         if frame < 0:
             for i in range(6):
-                g[world + c, i] = g[BODY + c, B_A + i]
+                g[row, i] = g[body, B_A + i]
             continue
         f = FRAMES + frame
         r = (g[f, 6], g[f, 7], g[f, 8], g[f, 9])
-        a = rotate(r, (g[BODY + c, 2], g[BODY + c, 3], g[BODY + c, 4]))
-        b = rotate(r, (g[BODY + c, 5], g[BODY + c, 6], g[BODY + c, 7]))
+        a = rotate(r, (g[body, 2], g[body, 3], g[body, 4]))
+        b = rotate(r, (g[body, 5], g[body, 6], g[body, 7]))
         for i in range(3):
-            g[world + c, W_A + i] = a[i] + g[f, 3 + i]
-            g[world + c, W_B + i] = b[i] + g[f, 3 + i]
+            g[row, W_A + i] = a[i] + g[f, 3 + i]
+            g[row, W_B + i] = b[i] + g[f, 3 + i]
+            g[row, W_CENTER + i] = 0.5 * (g[row, W_A + i] + g[row, W_B + i])
+    _hold_all(g, world, count)
 
 
-@kernel
+@inner
+def _hold_all(g, world, count):
+    """A ball about all capsules that move, into columns 10 to 13 of the first row: center and radius."""
+    x = y = z = 0.0
+    moving = 0
+    for c in range(count):
+        if g[BODY + c, B_FRAME] >= 0.0:
+            x, y, z = x + g[world + c, W_CENTER], y + g[world + c, 7], z + g[world + c, 8]
+            moving += 1
+    x, y, z = x / max(moving, 1), y / max(moving, 1), z / max(moving, 1)
+    radius = 0.0
+    for c in range(count):
+        if g[BODY + c, B_FRAME] >= 0.0:
+            u, v, w = g[world + c, W_CENTER] - x, g[world + c, 7] - y, g[world + c, 8] - z
+            radius = max(radius, math.sqrt(u * u + v * v + w * w) + g[BODY + c, B_BALL])
+    g[world, W_ALL], g[world, 11], g[world, 12], g[world, 13] = x, y, z, radius
+
+
+@inlined
 def end_a(g, row):
     """First end of a capsule in the world."""
     return (g[row, 0], g[row, 1], g[row, 2])
 
 
-@kernel
+@inlined
 def end_b(g, row):
     """Second end of a capsule in the world."""
     return (g[row, 3], g[row, 4], g[row, 5])
 
 
-@kernel
+@inlined
 def may_touch(g, obstacle, capsule):
     """True if a wanted contact: the pair is not looked at."""
     return (int(g[OBSTACLES + obstacle, MASK]) >> capsule) & 1 == 1

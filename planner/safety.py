@@ -19,10 +19,26 @@ from numpy.typing import ArrayLike
 from .arm import Arm
 from .barrier import DECAY, HALVINGS, SHELL, constrain, exceeds_limits, scale_into_limits, scale_to_speeds
 from .body import Body
-from .clearance import find_near, reach_of, room_of_near, step_stays_clear
+from .clearance import find_near, least_room, reach_of, room_of_near, step_stays_clear
 from .errors import BadOption, BadShape, UnknownName
 from .jit import inner, kernel
-from .robot_work import HEADER, N_NEAR, NEXT, PREVIOUS, SETTINGS, STEP, WISH, WORLD, place_capsules, robot_work
+from .robot_work import (
+    HEADER,
+    LEVERS,
+    N_NEAR,
+    NEXT,
+    PREVIOUS,
+    SEEN,
+    SEEN_COUNTS,
+    SEEN_MOVING,
+    SEEN_ROOM,
+    SETTINGS,
+    STEP,
+    WISH,
+    WORLD,
+    place_capsules,
+    robot_work,
+)
 from .shapes import Obstacle, pack
 
 FREE, CHANGED, HELD, BLOCKED = 0, 1, 2, 3
@@ -119,6 +135,30 @@ def _shortened(g, q, x, dt):
     return BLOCKED
 
 
+@inner
+def _all_far(g, q, x, dt):
+    """True if at the last look everything was so far that nothing can be close now, nor during this step."""
+    if g[SEEN, SEEN_COUNTS] == 0.0 or g[SEEN, SEEN_MOVING] == 1.0:
+        return False
+    way = 0.0
+    for i in range(len(q)):
+        way += g[LEVERS, i] * (abs(q[i] - g[SEEN, i]) + abs(x[i]) * dt)
+    # two parts of the robot may both move
+    return g[SEEN, SEEN_ROOM] - 2.0 * way > g[SETTINGS, SHELL]
+
+
+@inner
+def _look(g, q):
+    """Find the near pairs at q; where there are none, remember how far everything is."""
+    place_capsules(g, q, WORLD)
+    find_near(g, g[SETTINGS, SHELL])
+    g[SEEN, SEEN_COUNTS] = 0.0
+    if int(g[HEADER, N_NEAR]) == 0:
+        g[SEEN, SEEN_ROOM], g[SEEN, SEEN_COUNTS] = least_room(g, WORLD, 0.0, 1.0), 1.0
+        for i in range(len(q)):
+            g[SEEN, i] = q[i]
+
+
 @kernel
 def safe_velocity(g, q, qdot, dt, out):
     """Joint speeds near the wanted ones that keep clear; the status (FREE, CHANGED, HELD or BLOCKED).
@@ -133,10 +173,12 @@ def safe_velocity(g, q, qdot, dt, out):
     n = len(q)
     for i in range(n):
         out[i] = qdot[i] if math.isfinite(qdot[i]) else 0.0
-    place_capsules(g, q, WORLD)
-    find_near(g, g[SETTINGS, SHELL])
     scale_to_speeds(g, out)
-    missed = False
+    missed, far = False, _all_far(g, q, out, dt)
+    if far:
+        g[HEADER, N_NEAR] = 0
+    else:
+        _look(g, q)
     if int(g[HEADER, N_NEAR]) > 0 or exceeds_limits(g, q, out):
         missed = constrain(g, q, out)
     scale_into_limits(g, q, out)
@@ -144,7 +186,11 @@ def safe_velocity(g, q, qdot, dt, out):
     for i in range(n):
         if out[i] != qdot[i]:
             status = CHANGED
-    status = max(status, _shortened(g, q, out, dt))
+    # bounds change speeds by no more than the slew, and only where something is near or a limit is
+    if not (far and _all_far(g, q, out, dt)):
+        if far:
+            _look(g, q)
+        status = max(status, _shortened(g, q, out, dt))
     for i in range(n):
         g[PREVIOUS, i] = out[i]
     return BLOCKED if missed else status

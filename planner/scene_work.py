@@ -15,7 +15,7 @@ from .edges import tool_room, tool_work
 from .errors import BadOption
 from .pose import Pose
 from .repet import MAX_OBSTACLES
-from .robot_work import MARGIN, OBSTACLES, robot_work
+from .robot_work import MARGIN, OBSTACLES, SEEN, SEEN_COUNTS, SEEN_MOVING, robot_work
 from .safety import SafetySettings, contact_masks
 from .shapes import Obstacle, pack
 
@@ -28,6 +28,10 @@ def checked_obstacles(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
     if len(obstacles) > MAX_OBSTACLES:
         raise BadOption("obstacles", f"there are {len(obstacles)}; allowed are {MAX_OBSTACLES}")
     return tuple(obstacles)
+
+
+PLACE = slice(2, 20)
+"""Columns of an obstacle that change when it moves."""
 
 
 class SceneWork:
@@ -71,7 +75,8 @@ class SceneWork:
         """The same obstacles at other places, with other velocities."""
         rows = pack(obstacles).rows
         for work in (self.robot, self._tool):
-            work[OBSTACLES : OBSTACLES + len(rows), : rows.shape[1]] = rows
+            work[OBSTACLES : OBSTACLES + len(rows), PLACE] = rows[:, PLACE]
+            work[SEEN, SEEN_COUNTS], work[SEEN, SEEN_MOVING] = 0.0, np.any(rows[:, 17:20])
 
     def tool(self, factor: float = 1.0) -> np.ndarray:
         """The tool's array, planning distances scaled where an obstacle has none of its own."""

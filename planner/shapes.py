@@ -30,16 +30,16 @@ from .pose import Pose
 
 SPHERE, CAPSULE, BOX, CYLINDER, MESH = 0.0, 1.0, 2.0, 3.0, 4.0
 ROW = 24
-LARGEST = 100.0
-"""Extents above this [m] are in another unit."""
+SMALLEST, LARGEST = 1e-6, 100.0
+"""Extents below or above these [m] are mistakes."""
 MAX_VERTICES = 256
 """Of one convex mesh: the queries look at all of them."""
 
 
 def _length(shape: str, name: str, value: float) -> float:
     number = float(value)
-    if not math.isfinite(number) or not 0.0 < number <= LARGEST:
-        raise UnfitShape(shape, name, f"{value!r} is not a length above 0 and up to {LARGEST:g} m")
+    if not math.isfinite(number) or not SMALLEST <= number <= LARGEST:
+        raise UnfitShape(shape, name, f"{value!r} is not a length from {SMALLEST:g} to {LARGEST:g} m")
     return number
 
 

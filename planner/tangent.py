@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 
 from . import screw
-from .jit import inner, kernel
+from .jit import inlined, kernel
 
 SIDES = 8
+COSINES = tuple(math.cos(0.25 * math.pi * k) for k in range(SIDES))
 """Ways that every node looks at: the corners and the middles of the sides."""
 
 
 @kernel
 def random_number(state):
     """A number in [0, 1) from a state (1,) that it moves on; the same on every machine (Park and Miller 1988)."""
-    state[0] = (16807.0 * state[0]) % 2147483647.0
-    return state[0] / 2147483647.0
+    number = (16807 * int(state[0])) % 2147483647
+    state[0] = number
+    return number / 2147483647.0
 
 
-@inner
+@inlined
 def _unit(v):
     length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     if length < 1e-12:
@@ -26,7 +28,7 @@ def _unit(v):
     return (v[0] / length, v[1] / length, v[2] / length)
 
 
-@kernel
+@inlined
 def plane_basis(normal, towards, world_basis):
     """Directions u and v of a plane: right-handed and orthonormal with the normal.
 
@@ -46,14 +48,13 @@ def plane_basis(normal, towards, world_basis):
     return screw.cross(v, normal), v
 
 
-@kernel
+@inlined
 def child_direction(k, normal, u, v, square, away, state):
     """Way of child k in units of the step: eight sides, then random ones in the plane, some with a part outwards."""
     if k < SIDES:
-        angle = 0.25 * math.pi * k
         # the paper's children: corners of a square, and the middles of its sides at 1 / sqrt(2) of the distance
         size = math.sqrt(0.5) if square == 1.0 and k % 2 == 1 else 1.0
-        a, b, c = size * math.cos(angle), size * math.sin(angle), 0.0
+        a, b, c = size * COSINES[k], size * COSINES[(k + 6) % SIDES], 0.0
     else:
         a, b = 2.0 * random_number(state) - 1.0, 2.0 * random_number(state) - 1.0
         c = away * random_number(state)

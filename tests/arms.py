@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from strategies import random_dq
 
+from onedemo.planner import dualquat as dq
 from onedemo.planner.arm import Arm
 
 
@@ -46,3 +47,15 @@ def random_arm(seed: int, dof: int = 7, prismatic: float = 0.2) -> Arm:
 
 def joints(arm: Arm, rng: np.random.Generator) -> np.ndarray:
     return rng.uniform(arm.lower, arm.upper)
+
+
+def joints_at(arm: Arm, x: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Joints near q whose tool is at x (8,) to the last digits, by Newton's method."""
+    for _ in range(20):
+        here, body = arm.fk_jacobian(q)
+        twist = dq.twist_from_dq(dq.mul(dq.conj(here), x))
+        if np.abs(twist).max() < 1e-14:
+            break
+        q = q + np.linalg.pinv(body) @ twist
+    assert np.abs(twist).max() < 1e-12
+    return q

@@ -1,8 +1,9 @@
 """Random problems, each a pure function of its kind and seed: a Panda among obstacles, and tools without an arm.
 
 What is accepted does not depend on whether a planner solves it. A draw is thrown away only if the start is not clear,
-the tool at the goal is not, no posture that reaches the goal is, or start and goal are too near to each other. All
-three are facts about single postures, told by the same distances that the tests of `proximity` check. Whether a way
+the tool at the goal is not, no posture that reaches the goal is, something stands in the arm's base, or start and goal
+are too near to each other. These are facts about single postures, told by the same distances that the tests of
+`proximity` check. Whether a way
 exists between them is nobody's business here: `feasible` asks that of what was not solved. A cage stands round the
 goal, so of a cage only the start is asked to be clear.
 """
@@ -13,20 +14,22 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
+import fcl
 import numpy as np
 from solids import KINDS as SHAPES
-from solids import fcl_capsule, fcl_distance, fcl_obstacle, random_shape
+from solids import fcl_distance, fcl_obstacle, random_shape
 from strategies import random_dq
 
 from onedemo.configs.shipped import shipped_demonstration
 from onedemo.envs.bodies import robot_body
 from onedemo.envs.scene import compiled_scene
 from onedemo.planner.arm import Arm
-from onedemo.planner.body import Body
+from onedemo.planner.body import FRAME, A, Body
 from onedemo.planner.certify import Certificate, certify
 from onedemo.planner.demo_io import load_demonstration
 from onedemo.planner.ik import inverse_kinematics
 from onedemo.planner.joint_search import connect
+from onedemo.planner.models import turn_z_to
 from onedemo.planner.motion_log import MotionLog
 from onedemo.planner.planning import Plan, Planner, PlanSettings
 from onedemo.planner.pose import Pose, PosePath
@@ -167,7 +170,7 @@ def problem(kind: str, seed: int) -> Problem:
             body = empty.holding("box", Box(tuple(rng.uniform(0.04, 0.12, 3))), at([0, 0, 0.03]), arm)
         obstacles = tuple(_obstacles(kind, rng, here, goal.position))
         scene = SceneWork.of(arm, body, obstacles, SETTINGS)
-        if scene.room(start) < START_ROOM:
+        if scene.room(start) < START_ROOM or base_gap(body, obstacles) < SETTINGS.safety.distance:
             continue
         if kind == "cage":
             return Problem(kind, seed, body, start, goal, obstacles, None)
@@ -176,6 +179,11 @@ def problem(kind: str, seed: int) -> Problem:
         posture = clear_posture(arm, scene, goal, start, rng)
         if posture is not None:
             return Problem(kind, seed, body, start, goal, obstacles, posture)
+
+
+def base_gap(body: Body, obstacles) -> float:
+    """Distance [m] of the parts that no joint moves; `SceneWork.room` leaves them out."""
+    return tool_gap(body.rows[body.rows[:, FRAME] < 0][:, A:], obstacles, Pose.identity())
 
 
 def clear_posture(arm, scene, goal, start, rng, tries: int = 12) -> np.ndarray | None:
@@ -227,7 +235,7 @@ def judged(problem: Problem, plan: Plan) -> Certificate:
 
 
 def feasible(problem: Problem, postures: int = 20, iterations: int = 40_000) -> bool:
-    """A way in joint space is found from the start to some clear posture at the goal, with hundreds of times the effort.
+    """A search with a hundred times the effort finds a way in joint space to some clear posture at the goal.
 
     It need not keep anything of the demonstration. True is proven; False only means that no way was found.
     """
@@ -269,7 +277,9 @@ def random_tool(rng: np.random.Generator, parts: int = 3) -> np.ndarray:
     return np.column_stack([ends.reshape(parts, 6), rng.uniform(0.01, 0.03, parts)])
 
 
-def tool_problem(kind: str, seed: int, shape: Callable[[np.random.Generator], Shape] | str | None = None) -> ToolProblem:
+def tool_problem(
+    kind: str, seed: int, shape: Callable[[np.random.Generator], Shape] | str | None = None
+) -> ToolProblem:
     """A tool on a screw of half a meter, with one of the obstacles of `KINDS` on its way (not "held").
 
     Args:
@@ -296,12 +306,35 @@ def tool_problem(kind: str, seed: int, shape: Callable[[np.random.Generator], Sh
             return ToolProblem(path, tool, tuple(obstacles))
 
 
-def tool_gap(tool: np.ndarray, obstacles, pose: Pose) -> float:
-    """Distance [m] of a tool at a pose from obstacles, by fcl; negative if they touch."""
-    solids = [fcl_obstacle(obstacle) for obstacle in obstacles]
-    least = np.inf
-    for row in tool:
-        a, b = (pose.rotation @ end + pose.position for end in (row[:3], row[3:6]))
-        least = min([least, *(fcl_distance(fcl_capsule(a, b, row[6]), solid) for solid in solids)])
-    return least
+class Gauge:
+    """Distance [m] of a tool at a pose from obstacles, by fcl; a negative number, of no meaning, if they touch.
 
+    Args:
+        tool: (m, 7) capsules in the tcp's frame.
+        obstacles: in the world.
+    """
+
+    def __init__(self, tool: np.ndarray, obstacles):
+        lengths = np.linalg.norm(tool[:, 3:6] - tool[:, :3], axis=1)
+        self._parts = [fcl.CollisionObject(fcl.Capsule(row[6], z)) for row, z in zip(tool, lengths, strict=True)]
+        self._places = [at(0.5 * (row[:3] + row[3:6]), along(row[3:6] - row[:3])) for row in tool]
+        self._solids = [fcl_obstacle(obstacle) for obstacle in obstacles]
+
+    def __call__(self, pose: Pose) -> float:
+        least = np.inf
+        for part, place in zip(self._parts, self._places, strict=True):
+            placed = pose @ place
+            part.setTransform(fcl.Transform(placed.rotation, placed.position))
+            least = min([least, *(fcl_distance(part, solid) for solid in self._solids)])
+        return least
+
+
+def along(way: np.ndarray) -> np.ndarray:
+    """(4,) quaternion that turns z to a direction; any for no way at all."""
+    length = np.linalg.norm(way)
+    return turn_z_to(way) if length > 0 else np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def tool_gap(tool: np.ndarray, obstacles, pose: Pose) -> float:
+    """`Gauge` for a single pose."""
+    return Gauge(tool, obstacles)(pose)

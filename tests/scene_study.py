@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -19,10 +20,12 @@ def study(kind: str, seeds: range, *, unlimited: bool = True) -> dict:
         seeds: one per scene.
         unlimited: look with hundreds of times the effort whether what was not solved can be solved.
     """
-    spent, ways, unsound, failed = [], Counter(), [], []
+    spent, busy, ways, unsound, failed = [], [], Counter(), [], []
     for seed in seeds:
         scene = problem(kind, seed)
+        begun = time.thread_time()
         plan = solve(scene)
+        busy.append(1e3 * (time.thread_time() - begun))
         spent.append(1e3 * plan.seconds)
         ways[plan.how or plan.reason] += 1
         if not plan.success:
@@ -42,6 +45,8 @@ def study(kind: str, seeds: range, *, unlimited: bool = True) -> dict:
         "share_of_feasible": round(solved / (solved + len(proven)), 4) if solved + len(proven) else None,
         "median_ms": round(float(np.median(spent)), 2),
         "p99_ms": round(float(np.quantile(spent, 0.99)), 1),
+        "median_cpu_ms": round(float(np.median(busy)), 2),
+        "p99_cpu_ms": round(float(np.quantile(busy, 0.99)), 1),
         "max_ms": round(max(spent), 1),
         "ways": dict(sorted(ways.items())),
         "seeds": [seeds.start, seeds.stop],

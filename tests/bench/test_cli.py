@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from onedemo.bench import perf
 from onedemo.bench.cli import main
 from onedemo.bench.records import read_records
 from onedemo.configs.shipped import shipped_demonstration
@@ -85,15 +86,146 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["run", "stack", "settings.motion.guid=1", "episodes=1"], "motion.guid: unknown key; allowed: guide"),
         (["run", "stack", "settings.motion.guide=2", "episodes=1"], "guide"),
         (["run", "stack", "settings.trim=soon", "episodes=1"], "trim"),
+        (["run", "stack", "level=L9"], "command line: level"),
+        (["fly"], "No such command 'fly'; onedemo knows: run, perf, "),
+        (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
+        (["--fast"], "No such option: --fast"),
+        (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
+        (
+            ["run", "stack", "--fast"],
+            "No such option: --fast; usage: onedemo run [OPTIONS] {config} [KEY=VALUE]...; op",
+        ),
+        (["perf", "--only"], "Option '--only' requires an argument"),
+        (["perf", "now"], "Got unexpected extra argument(s) (now); usage: onedemo perf"),
+        (["perf", "--only", "warp"], "unknown group or line of perf 'warp'; known: controller, step, process"),
+        (["perf", "--json", "no/x.json"], "--json: no/x.json cannot be written: there is no folder no"),
+        (["demo", "import", "x.csv"], "Missing option '--output' / '-o'; usage: onedemo demo import"),
+        (["demo", "import", "x.csv", "-o", "y.npz", "--rate", "soon"], "Invalid value for '--rate'"),
+        (["demo", "import", "x.csv", "-o", "no/x.npz"], "--output: no/x.npz cannot be written: there is no folder no"),
+        (["demo", "import", "x.csv", "-o", "."], "--output: . is a folder, not a file"),
+        (["run", "stack", "-o", "a_file", "episodes=1"], "command line: --output: no run folder at a_file/stack-"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_code_2(arguments, message, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
+    Path("a_file").touch()
     code, out, err = called(monkeypatch, capsys, *arguments)
     assert (code, out) == (2, "")
     assert message in err
     assert len(err.strip().splitlines()) == 1
     assert "Traceback" not in err
+
+
+def test_a_mistake_in_a_file_names_the_file_and_one_on_the_command_line_does_not(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text("name: mine\ntask: stack\ndemonstration: stack\nlevel: L8\n")
+    assert "mine.yaml: level: unknown level 'L8'" in called(monkeypatch, capsys, "run", "mine.yaml")[2]
+    _, _, err = called(monkeypatch, capsys, "run", "mine.yaml", "level=L9")
+    assert "command line: level: unknown level 'L9'" in err
+    assert "mine.yaml" not in err
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"task": "pour"}, "other.npz: task: is 'pour'; the task of this run is 'stack'"),
+        ({"task": ""}, "other.npz: task: is ''; the task of this run is 'stack'"),
+        ({"segments": ()}, "segment_names: 'approach' is missing; 'stack' needs approach, transfer, there are: none"),
+        (
+            {"segments": "approach"},
+            "segment_names: 'transfer' is missing; 'stack' needs approach, transfer, there are: ",
+        ),
+    ],
+)
+def test_a_demonstration_of_something_else_is_refused_by_file_and_key(changes, message, monkeypatch, capsys, tmp_path):
+    demo = load_demonstration(shipped_demonstration("stack"))
+    if changes.get("segments"):
+        changes = {"segments": demo.segments[:1]}
+    save_demonstration(dataclasses.replace(demo, **changes), tmp_path / "other.npz")
+    monkeypatch.chdir(tmp_path)
+    code, out, err = called(monkeypatch, capsys, "run", "stack", "demonstration=other.npz")
+    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+    assert message in err
+
+
+def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monkeypatch, capsys, tmp_path):
+    def missing(*_):
+        raise ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
+
+    monkeypatch.setattr("onedemo.envs.sim.compiled_scene", missing)
+    monkeypatch.chdir(tmp_path)
+    code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1")
+    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+    assert "the library libGL.so.1 is missing" in err
+    assert "apt install libgl1 libglib2.0-0" in err
+
+    def broken(*_):
+        raise ImportError("cannot import name 'x'")
+
+    monkeypatch.setattr("onedemo.envs.sim.compiled_scene", broken)
+    monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1"])
+    with pytest.raises(ImportError, match="cannot import name"):
+        main()
+
+
+def test_the_same_libraries_stand_in_readme_prerequisites_and_ci():
+    root = Path(__file__).parents[2]
+    for file in ("README.md", ".ci/prerequisites", ".ci/run"):
+        text = (root / file).read_text(encoding="utf-8")
+        assert "build-essential python3-dev python3-venv linux-libc-dev libgl1 libglib2.0-0" in text, file
+    for file in ("README.md", ".ci/run"):
+        assert "libegl1 libegl-mesa0 libgl1-mesa-dri" in (root / file).read_text(encoding="utf-8"), file
+
+
+@pytest.mark.parametrize("missing", ["libGL.so.1", "libgthread-2.0.so.0"])
+def test_the_prerequisites_name_a_missing_library_in_one_line(missing, tmp_path):
+    fake = tmp_path / "python3"
+    fake.write_text(f'#!/bin/sh\ncase "$*" in *CDLL*{missing}*) exit 1 ;; esac\nexec {sys.executable} "$@"\n')
+    fake.chmod(0o755)
+    check = Path(__file__).parents[2] / ".ci/prerequisites"
+    done = subprocess.run(["sh", str(check), str(fake)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert missing in line
+    assert "apt install" in line
+
+
+def test_perf_runs_what_matches_and_nothing_else(monkeypatch, capsys, tmp_path):
+    ran = []
+
+    def measured(name):
+        def measure():
+            ran.append(name)
+            return perf.row(name, 1.0, "ratio", 2.0, "a note")
+
+        return measure
+
+    lines = {group: {name: measured(name) for name in names} for group, names in perf.GROUPS.items()}
+    monkeypatch.setattr(perf, "GROUPS", lines)
+    file = tmp_path / "rows.json"
+    assert called(monkeypatch, capsys, "perf", "--only", "stack step*", "--json", file)[0] == 0
+    assert ran == [perf.STEP, perf.PEER_STEP]
+    rows = json.loads(file.read_text())["rows"]
+    assert [(row["name"], row["value"], row["goal"], row["ok"]) for row in rows] == [(n, 1.0, 2.0, True) for n in ran]
+    ran.clear()
+    assert called(monkeypatch, capsys, "perf", "--only", "process")[0] == 0
+    assert ran == [perf.MEMORY, perf.IMPORT, perf.START]
+
+
+def test_a_file_that_cannot_be_written_after_all_is_one_line(monkeypatch, capsys, tmp_path):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(perf, "write_json", full)
+    monkeypatch.setattr(perf, "GROUPS", {"step": {perf.STEP: lambda: perf.row(perf.STEP, 1.0, "ratio", 2.0)}})
+    code, _, err = called(monkeypatch, capsys, "perf", "--json", tmp_path / "x.json")
+    assert code == 2
+    assert err.strip().endswith("x.json cannot be written: No space left on device")
+
+
+def test_the_two_scenes_of_the_step_line_go_the_same_way():
+    """The line itself fails if they do not; its value depends on the machine."""
+    assert perf.GROUPS["step"][perf.STEP]().value > 0.5
 
 
 def test_a_run_leaves_everything_and_goes_on_where_it_stopped(tmp_path):

@@ -61,9 +61,20 @@ def test_a_report_explains_every_failure_and_contact():
     assert "## Failures\n\nNone." in clean
 
 
-def test_a_run_without_any_success_still_has_a_report():
+def test_a_run_without_any_success_says_so_in_words_and_null(tmp_path):
     row = summary_row(CONFIG, [FAILED])
-    assert "0 of 1 succeeded" in report_text(CONFIG, [FAILED], row, [], "c")
+    text = report_text(CONFIG, [FAILED], row, [], "c")
+    assert "0 of 1 succeeded" in text
+    assert "no success, so no error" in text
+    assert "nan" not in text.lower().replace("explanation", "")
+    write_summary(tmp_path / "summary.json", [row])
+    written = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)["rows"][0]
+    assert written["position_error_mm_median"] is written["position_error_mm_max"] is None
+    assert written["seconds_median"] == FAILED.seconds
+
+
+def test_the_words_of_a_run_of_nothing_are_no_numbers():
+    assert "nan" not in " ".join(verdict(summary_row(CONFIG, [])))
 
 
 @pytest.mark.parametrize(

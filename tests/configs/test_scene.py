@@ -34,8 +34,14 @@ BAD = {
     "short pose": (GOAL + "demonstration: [[0, 0, 1]]\n", r"demonstration\[0\]: list should have at least 7 items"),
     "text pose": (GOAL + "demonstration: [[0, 0, x, 0, 1, 0, 0]]\n", r"demonstration\[0\]\[2\]: .*number, got 'x'"),
     "pose not unit": (GOAL + "demonstration: [[0, 0, 1, 0, 2, 0, 0]]\n", "demonstration: poses: .*index 0 has norm 2"),
-    "pose nan": (GOAL + "demonstration: [[0, .nan, 1, 0, 1, 0, 0]]\n", "demonstration: poses: is not finite at index 0"),
-    "poses far": (GOAL + "demonstration: [[0, 900, 1, 0, 1, 0, 0]]\n", "demonstration: pose: position: 900 m away: mill"),
+    "pose nan": (
+        GOAL + "demonstration: [[0, .nan, 1, 0, 1, 0, 0]]\n",
+        "demonstration: poses: is not finite at index 0",
+    ),
+    "poses far": (
+        GOAL + "demonstration: [[0, 900, 1, 0, 1, 0, 0]]\n",
+        "demonstration: pose: position: 900 m away: mill",
+    ),
     "no such recording": (GOAL + "demonstration: {file: stak}\n", "demonstration: unknown demonstration 'stak'; known"),
     "no such file": (GOAL + "demonstration: {file: x.npz}\n", r"demonstration: .*x\.npz: file: does not exist"),
     "no such segment": (GOAL + "demonstration: {file: stack, segment: x}\n", "demonstration: unknown segment .* 'x'"),
@@ -55,7 +61,10 @@ BAD = {
     "start a number": (GOOD + "start: 3\n", "start: must be a list of joints, or home, got 3"),
     "robot a number": (GOOD + "robot: 7\n", "robot.*dictionary|robot: must be a robot's name"),
     "robot without frame": (GOOD + "robot: {urdf: x.urdf}\n", "robot.tcp_frame: is missing"),
-    "robot key": (GOOD + "robot: {urdf: x, tcp_frame: y, tcp: z}\n", "robot.tcp: unknown key; allowed: urdf, tcp_frame"),
+    "robot key": (
+        GOOD + "robot: {urdf: x, tcp_frame: y, tcp: z}\n",
+        "robot.tcp: unknown key; allowed: urdf, tcp_frame",
+    ),
     "seed": (GOOD + "seed: -1\n", "seed: .*greater than or equal to 0, got -1"),
     "seed text": (GOOD + "seed: '1'\n", "seed: .*integer, got '1'"),
     "settings": (GOOD + "settings: 3\n", "settings: .*dictionary"),
@@ -73,9 +82,18 @@ BAD = {
         obstacle("shape: sphere, radius: 1, size: [1, 1, 1], position: [0, 0, 0]"),
         r"obstacles\[1\].size: a sphere has none; it has radius",
     ),
-    "radius 0": (obstacle("shape: sphere, radius: 0, position: [0, 0, 0]"), r"obstacles\[1\]: sphere: radius: 0.0 is no"),
-    "radius nan": (obstacle("shape: sphere, radius: .nan, position: [0, 0, 0]"), r"obstacles\[1\]: sphere: radius: nan"),
-    "radius in mm": (obstacle("shape: sphere, radius: 300, position: [0, 0, 0]"), r"obstacles\[1\]: sphere: radius: 300"),
+    "radius 0": (
+        obstacle("shape: sphere, radius: 0, position: [0, 0, 0]"),
+        r"obstacles\[1\]: sphere: radius: 0.0 is no",
+    ),
+    "radius nan": (
+        obstacle("shape: sphere, radius: .nan, position: [0, 0, 0]"),
+        r"obstacles\[1\]: sphere: radius: nan",
+    ),
+    "radius in mm": (
+        obstacle("shape: sphere, radius: 300, position: [0, 0, 0]"),
+        r"obstacles\[1\]: sphere: radius: 300",
+    ),
     "size": (obstacle("shape: box, size: [1, -1, 1], position: [0, 0, 0]"), r"obstacles\[1\]: box: size\[1\]: -1"),
     "flat mesh": (
         obstacle("shape: mesh, vertices: [[0,0,0],[1,0,0],[0,1,0],[1,1,0]], position: [0, 0, 0]"),
@@ -94,7 +112,10 @@ BAD = {
         r"obstacles\[1\]: obstacle '': velocity holds a value that is not finite",
     ),
     "margin": (obstacle("shape: sphere, radius: 1, position: [0, 0, 0], margin: -1"), r"obstacles\[1\]: .*margin: -1"),
-    "obstacle key": (obstacle("shape: sphere, radios: 1, position: [0, 0, 0]"), r"\[1\].radios: unknown key; did you me"),
+    "obstacle key": (
+        obstacle("shape: sphere, radios: 1, position: [0, 0, 0]"),
+        r"\[1\].radios: unknown key; did you me",
+    ),
     "held": (GOOD + "held: {shape: sphere, radius: 0.1}\n", "held.tcp_from_object: is missing"),
     "held radius": (
         GOOD + "held: {shape: sphere, radius: -1, tcp_from_object: {position: [0, 0, 0]}}\n",
@@ -122,7 +143,10 @@ def test_a_bad_scene_is_refused_in_one_line_that_names_file_and_key(name, tmp_pa
     [
         ("gaol=1", "^command line: gaol: unknown key; did you mean 'goal'"),
         ("goal.yaw=1", "^command line: goal.yaw: unknown key; allowed: position, quaternion, rpy_degrees, yaw_deg"),
-        ("obstacles=[{shape: sphere, radius: -1, position: [0, 0, 0]}]", r"^command line: obstacles\[0\]: sphere: radius"),
+        (
+            "obstacles=[{shape: sphere, radius: -1, position: [0, 0, 0]}]",
+            r"^command line: obstacles\[0\]: sphere: radius",
+        ),
         ("seed=x", "^command line: seed: .*got 'x'"),
     ],
 )

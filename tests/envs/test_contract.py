@@ -108,15 +108,52 @@ def test_actions_beyond_the_bounds_are_the_bounds(mode):
         (lambda a: a[None], r"action: has shape \(1, 8\)"),
         (lambda a: np.where(np.arange(8) == 3, np.nan, a), "action: entry 3 is not finite"),
         (lambda a: np.where(np.arange(8) == 5, -np.inf, a), "action: entry 5 is not finite"),
+        (lambda a: "x", "action: is not an array of real numbers"),
+        (lambda a: {}, "action: is not an array of real numbers"),
+        (lambda a: None, "action: is not an array of real numbers"),
+        (lambda a: a.astype(str), "action: is not an array of real numbers"),
+        (lambda a: a + 1j, "action: is not an array of real numbers, but of complex128"),
+        (lambda a: [[0.0], [0.0, 0.0]], "action: is not an array of numbers"),
     ],
 )
 def test_bad_actions_are_refused_and_change_nothing(spoil, message):
     env = gym.make("onedemo/Stack-v0").unwrapped
     env.reset(seed=0)
-    before = env.sim.data.time
-    with pytest.raises(BadAction, match=message):
-        env.step(spoil(np.zeros(8)))
+    before, controls = env.sim.data.time, env.sim.data.ctrl.copy()
+    with pytest.raises(BadAction, match=message) as caught:
+        env.step(spoil(np.full(8, 0.5)))
+    assert "\n" not in str(caught.value)
     assert env.sim.data.time == before
+    np.testing.assert_array_equal(env.sim.data.ctrl, controls)
+
+
+def test_a_twist_that_is_not_finite_is_refused():
+    env = gym.make("onedemo/Stack-v0", control_mode="ee_twist").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(BadAction, match="entry 2 is not finite"):
+        env.step(np.array([0, 0, np.inf, 0, 0, 0, np.nan]))
+    assert env.sim.data.time == 0.0
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        lambda a: a.tolist(),
+        lambda a: a.astype(np.float32),
+        lambda a: np.repeat(a, 2)[::2],
+        lambda a: np.frombuffer(a.tobytes()),
+    ],
+    ids=["list", "single precision", "strided", "read-only"],
+)
+def test_actions_of_every_array_type_act_alike_and_compile_nothing(same, env):
+    from onedemo.envs.state import command
+
+    outcomes, action = [], np.linspace(-0.5, 0.5, 8)
+    for given in (action.astype(np.float32).astype(float), same(action.astype(np.float32).astype(float))):
+        env.reset(seed=1)
+        outcomes.append(env.step(given)[0]["joint_positions"])
+    np.testing.assert_array_equal(*outcomes)
+    assert len(command.signatures) == 1
 
 
 @each_id

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import gymnasium as gym
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.layouts import BASE_GAP, BLOCK_GAP, FARTHEST, LEVELS, NEAREST, fits, nominal_blocks, stack_layout
 from onedemo.envs.scene import ARM, FINGERS, FIRST_OBJECT, WORLD
-from onedemo.envs.stack_rules import StackProgress, allowed_contact
+from onedemo.envs.stack_rules import BLOCK_SIZE, StackProgress, allowed_contact
+from onedemo.envs.state import read_arms, read_objects
 from onedemo.planner.errors import BadOption, OneDemoError
 from onedemo.planner.pose import Pose
 
@@ -149,13 +154,80 @@ def test_the_nominal_level_is_one_layout(env):
 
 
 def test_wanted_contacts():
-    progress = StackProgress(3, 0.02)
-    block = FIRST_OBJECT
-    assert allowed_contact((WORLD, block), progress)
-    assert allowed_contact((FINGERS, block), progress)
-    assert allowed_contact((block, block + 1), progress)
+    block, placed = FIRST_OBJECT, 0
+    assert allowed_contact(WORLD, block, placed)
+    assert allowed_contact(FINGERS, block, placed)
+    assert allowed_contact(FINGERS, block, placed + 1), "let go last"
+    assert allowed_contact(block, block + 1, placed)
+    for own in ((ARM, ARM), (ARM, FINGERS), (FINGERS, FINGERS), (WORLD, WORLD), (block, block)):
+        assert allowed_contact(*own, placed), own
     for pair in ((FINGERS, block + 1), (ARM, block), (WORLD, ARM), (WORLD, FINGERS), (block, block + 2)):
-        assert not allowed_contact(pair, progress), pair
+        assert not allowed_contact(*pair, placed), pair
+    assert not allowed_contact(FINGERS, block, placed + 2)
+
+
+def test_every_unwanted_pair_counts_and_the_last_one_is_named(env):
+    env.reset(seed=0)
+    progress = env._progress
+    touching = np.zeros_like(env.sim.read().touching)
+    for pair in ((WORLD, FIRST_OBJECT), (ARM, FINGERS), (WORLD, FINGERS), (ARM, FIRST_OBJECT + 1)):
+        touching[pair] = 1.0
+    verdict = progress.update(env.sim.read()._replace(touching=touching))
+    assert (verdict.unwanted, verdict.low, verdict.high) == (2, ARM, FIRST_OBJECT + 1)
+    assert progress.info()["n_contacts"] == 2
+    assert not progress.info()["safe"]
+
+
+def test_a_lifted_block_that_stands_elsewhere_was_dropped_and_one_in_the_hand_was_not(env):
+    env.reset(seed=0)
+    state = env.sim.read()
+    progress = StackProgress(env._goal_pose, state.object_pose, env.control_dt)
+
+    def failure(height, gripped, speed=0.0):
+        poses, touching = state.object_pose.copy(), np.zeros_like(state.touching)
+        poses[0, 2] += height
+        touching[FINGERS, FIRST_OBJECT] = gripped
+        moving = np.full_like(state.object_velocity, speed)
+        progress.update(state._replace(object_pose=poses, object_velocity=moving, touching=touching))
+        return progress.failure
+
+    assert failure(0.0, gripped=True) == ""
+    assert failure(0.0, gripped=False) == "", "it was never lifted"
+    assert failure(0.021, gripped=True) == ""
+    assert progress.info()["stage"] == "lifted block 1 of 3"
+    assert failure(0.021, gripped=False, speed=0.5) == "", "it still falls"
+    assert failure(0.0, gripped=False) == "dropped"
+
+
+def test_touching_is_what_mujoco_says(env):
+    env.reset(seed=0)
+    for _ in range(60):
+        env.step(np.array([0, 0.4, 0, -0.1, 0, 0, 0, 1.0]))
+    owners, touching = env.sim.scene.owner, env.sim.read().touching
+    pairs = {tuple(sorted(owners[geom] for geom in contact.geom)) for contact in env.sim.data.contact}
+    assert {tuple(pair) for pair in np.argwhere(touching)} == pairs
+    assert {(WORLD, FIRST_OBJECT), (WORLD, FINGERS)} <= pairs
+    for pair in pairs:
+        assert "-" in env.sim.contact_name(pair)
+
+
+def test_reading_compiles_nothing_anew_however_few_contacts_there_are(env):
+    """An array of one row is another type to the compiler than one of twelve."""
+    env.reset(seed=0)
+    model, data, places = env.sim.model, env.sim.data, env.sim._object_places
+    turn = Rotation.from_euler("xyz", [0.6, 0.5, 0.3])
+    lowest = turn.apply(0.5 * np.array(BLOCK_SIZE) * np.array(list(product((-1, 1), repeat=3))))[:, 2].min()
+    counts = []
+    for on_corner in (False, True):
+        data.qpos[places + 2] = [2.0, 3.0, 4.0]
+        if on_corner:
+            data.qpos[places[0] : places[0] + 3] = [0.1, 0.0, 0.7995 - lowest]
+            data.qpos[places[0] + 3 : places[0] + 7] = turn.as_quat()[[3, 0, 1, 2]]
+        mujoco.mj_forward(model, data)
+        counts.append(data.ncon)
+        assert env.sim.read().touching[WORLD, FIRST_OBJECT] == on_corner
+    assert counts == [0, 1]
+    assert len(read_objects.signatures) == len(read_arms.signatures) == 1
 
 
 def test_an_arm_driven_into_the_table_is_unsafe_and_named(env):

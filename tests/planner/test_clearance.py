@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 import pytest
 from arms import random_arm
 from hypothesis import strategies as st
-from soak import frames_of, panda_body, panda_pairs, random_body, random_obstacles
+from soak import facing_pandas, frames_of, panda_body, panda_pairs, random_body, random_obstacles
 from solids import random_pose
 from strategies import for_all, known_defect
 
-from onedemo.planner import jit
+from onedemo.planner import jit, screw
 from onedemo.planner.arm import Arm
 from onedemo.planner.barrier import _lay_bounds
 from onedemo.planner.body import Body
@@ -33,16 +34,18 @@ from onedemo.planner.clearance import (
     room_of_near,
     step_stays_clear,
 )
+from onedemo.planner.edges import is_clear, tool_room, tool_work
 from onedemo.planner.pose import Pose
 from onedemo.planner.robot_work import (
     BOUNDS,
     HEADER,
+    HIGH,
+    LOW,
     N_NEAR,
     NEAR,
     NEXT,
     OBSTACLES,
     SETTINGS,
-    SLIDING,
     STEP,
     W_REACH,
     WORLD,
@@ -53,6 +56,8 @@ from onedemo.planner.safety import SafetySettings
 from onedemo.planner.shapes import Box, Obstacle, Sphere, pack
 
 seeds = st.integers(0, 10**6)
+SHARE = float(os.environ.get("ONEDEMO_SOAK", "1"))
+"""Scales the long runs."""
 lay_bounds = jit.numba.njit(error_model="numpy")(lambda g, q: _lay_bounds(g, q))
 SETTING = SafetySettings(distance=0.01, self_distance=0.015, shell=0.5)
 
@@ -65,7 +70,7 @@ def work_of(arm: Arm, body: Body, obstacles, pairs=(), masks=(), setting: Safety
         masks=masks,
         margin=setting.distance,
         pairs=pairs,
-        settings=setting.packed(),
+        settings=setting.packed(0.01),
     )
 
 
@@ -188,6 +193,38 @@ def test_bounds_are_the_derivatives_of_the_distances(seed):
         assert bound[32] == pytest.approx(closing - SETTING.alpha * room, abs=2e-4)
 
 
+def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
+    """Both Pandas, against an obstacle and against each other."""
+    robot, rng = facing_pandas(), np.random.default_rng(0)
+    ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.4, 0, 0.4]))
+    g = robot_work(
+        robot.arms, robot.bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SETTING.packed(0.01)
+    )
+    checked = 0
+    for _ in range(5):
+        q = rng.uniform(g[LOW, :14], g[HIGH, :14])
+        place_capsules(g, q, WORLD)
+        find_near(g, 0.3)
+        lay_bounds(g, q)
+        rows, first = near_rows(g).copy(), int(g[HEADER, BOUNDS])
+        bounds = g[first : first + len(rows), :14].copy()
+        for row, bound in zip(rows, bounds, strict=True):
+            i, j = int(row[FIRST]), int(row[OTHER])
+            if row[GAP] < -0.02:
+                continue
+            slopes = []
+            for e in 1e-6 * np.eye(14):
+                gaps = []
+                for sign in (1, -1):
+                    place_capsules(g, q + sign * e, NEXT)
+                    gap = capsule_distance(g, NEXT, i, j) if row[KIND] else obstacle_distance(g, NEXT, i, j, 0.0, 1e3)
+                    gaps.append(gap)
+                slopes.append((gaps[0] - gaps[1]) / 2e-6)
+            checked += 1
+            np.testing.assert_allclose(bound, slopes, rtol=0, atol=1e-3)
+    assert checked > 20
+
+
 @for_all(seeds, st.floats(-3, 0.5), max_examples=100)
 def test_no_point_of_a_core_goes_farther_than_its_bound(seed, exponent):
     """Lengths of sampled ways: arms with turning and sliding joints, steps up to half a turn."""
@@ -197,7 +234,7 @@ def test_no_point_of_a_core_goes_farther_than_its_bound(seed, exponent):
     g = work_of(arm, body, [])
     q, step = rng.uniform(-2, 2, arm.dof), 10**exponent * rng.normal(size=arm.dof) * (rng.uniform(size=arm.dof) < 0.7)
     place_capsules(g, q, WORLD)
-    bound_motion(g, WORLD, g[SLIDING], step)
+    bound_motion(g, WORLD, step)
     bound = g[WORLD : WORLD + len(body), W_REACH].copy()
     places = []
     for s in np.linspace(0, 1, 60):
@@ -216,7 +253,7 @@ def test_the_bound_of_one_joint_is_its_arc():
     body = Body(np.array([[0, 0.3, 0.4, 0.1, 0.3, 0.4, 0.7, 0.02]]), ("rod",))
     g = work_of(arm, body, [])
     place_capsules(g, np.zeros(1), WORLD)
-    bound_motion(g, WORLD, g[SLIDING], np.array([-0.2]))
+    bound_motion(g, WORLD, np.array([-0.2]))
     assert g[WORLD, W_REACH] == pytest.approx(0.2 * 0.5, abs=1e-12)
 
 
@@ -238,7 +275,7 @@ def worst_room(g, q, step, dt: float, count: int = 200) -> float:
 def test_a_step_that_is_proven_clear_is_clear():
     """Random arms and all shapes, still and moving, plates of 2 mm; steps up to a radian; judged at 200 places."""
     counts = {True: 0, False: 0}
-    for seed in range(300):
+    for seed in range(max(10, round(300 * SHARE))):
         g, arm, _, rng = robot(seed, moving=bool(seed % 2))
         for _ in range(20):
             q = rng.uniform(-2, 2, arm.dof)
@@ -249,7 +286,7 @@ def test_a_step_that_is_proven_clear_is_clear():
             counts[answer] += 1
             if answer:
                 assert worst_room(g, q, step, dt) >= -1e-9, (seed, q, step)
-    assert min(counts.values()) > 200
+    assert SHARE < 1 or min(counts.values()) > 200
 
 
 def test_a_step_with_room_to_spare_is_proven_clear():
@@ -315,6 +352,28 @@ def test_sliding_along_a_plane_is_proven_however_long():
     g = work_of(gantry(), POINT, [Obstacle(Box((4.0, 4.0, 1.0)))])
     q = np.array([-1.0, 0.3, 0.5 + 0.02 + 0.01 + 1.1e-4])
     assert proven(g, q, np.array([2.0, -0.5, 0.0]), 1.0)
+
+
+def test_a_pass_by_a_small_ball_is_not_proven_by_two_distances_that_suffice_for_contact():
+    g = work_of(gantry(), POINT, [Obstacle(Sphere(0.001))])
+    q, step = np.array([-0.008, 0.0, 0.030]), np.array([0.016, 0.0, 0.0])
+    assert room_at(g, q, 0.0, 1.0) > 0 and worst_room(g, q, step, 1.0) < -9e-4
+    assert not proven(g, q, step, 1.0)
+
+
+def test_a_path_of_one_joint_bends_towards_the_wall():
+    """What bulges out between the ends is seen, however the wall stands."""
+    chain = np.zeros((2, 8))
+    chain[:, 0] = 1.0
+    arm = Arm("door", ("hinge",), chain, np.array([-3.0]), np.array([3.0]), np.array([50.0]))
+    body = Body(np.array([[0, 0.5, 0, 0, 0.5, 0, 0, 0.02]]), ("edge",))
+    for angle in (0.1, 0.4, 1.0):
+        bulge = 0.5 * (1.0 - math.cos(0.5 * angle))
+        for share, clear in ((0.3, False), (0.9, False), (0.99, False), (1.5, True)):
+            face = 0.5 * math.cos(0.5 * angle) + share * bulge + SETTING.distance + 0.02
+            wall = Obstacle(Box((10, 10, 10)), Pose.from_position_quaternion([face + 5.0, 0, 0]))
+            g = work_of(arm, body, [wall])
+            assert proven(g, np.array([-0.5 * angle]), np.array([angle]), 1.0) == clear
 
 
 def planar_arm() -> Arm:
@@ -390,6 +449,54 @@ def test_a_robot_does_not_hit_itself_within_a_step():
     assert min(seen) > 30
 
 
+def test_an_edge_past_a_small_ball_and_a_turn_through_a_plate_are_not_proven():
+    """A slide that comes a little too close half-way, from far and near; a turn on the spot, at the end of a rod."""
+    ball = pack([Obstacle(Sphere(0.001))])
+    g = tool_work(np.array([[0, 0, 0, 0, 0, 0, 0.02]]), ball, margin=0.01)
+    for height in (0.001, 0.02, 0.029, 0.0305):
+        for reach in (0.04, 0.1, 0.5, 2.0):
+            x, y = (tuple(Pose.from_position_quaternion([side * reach, 0, height]).dq) for side in (-1, 1))
+            assert not is_clear(g, x, y, 0.01)
+    x, y = (tuple(Pose.from_position_quaternion([side, 0, 0.0315]).dq) for side in (-1, 1))
+    assert is_clear(g, x, y, 0.01)
+    plate = pack([Obstacle(Box((1.0, 0.001, 1.0)), Pose.from_position_quaternion([0.6, 0, 0]))])
+    g = tool_work(np.array([[0.3, 0, 0, 0.3, 0, 0, 0.02]]), plate, margin=0.01)
+    x, y, away = (
+        tuple(Pose.from_position_quaternion(np.zeros(3), [np.cos(a), 0, 0, np.sin(a)]).dq) for a in (-0.3, 0.3, -0.9)
+    )
+    assert not is_clear(g, x, y, 0.01) and is_clear(g, x, away, 0.01)
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_an_edge_of_a_tool_that_is_proven_clear_is_clear(turning):
+    """Slides and screws, judged at 200 places; and few that are clear are refused."""
+    counts, refused = [0, 0], 0
+    for seed in range(max(25, round(60 * SHARE))):
+        rng = np.random.default_rng(seed)
+        tool = np.column_stack([rng.uniform(-0.1, 0.1, (2, 6)), [0.03, 0.02]])
+        g = tool_work(tool, pack(random_obstacles(rng)), margin=0.01)
+        for _ in range(10):
+            x = random_pose(rng, rng.uniform(-0.6, 0.6, 3))
+            way = random_pose(rng) if turning else Pose.identity()
+            y = Pose.from_position_quaternion(
+                x.position + rng.normal(size=3) * rng.choice([0.01, 0.1, 0.5]),
+                (x @ way).quaternion if turning else x.quaternion,
+            )
+            x, y = tuple(x.dq), tuple(y.dq)
+            if not turning:
+                y = (*x[:4], *y[4:]) if np.allclose(x[:4], y[:4]) else (*x[:4], *(-v for v in y[4:]))
+            answer = bool(is_clear(g, x, y, 0.01))
+            counts[answer] += 1
+            if answer or SHARE >= 1:
+                twist = screw.twist_of(screw.mul(screw.conj(x), y))
+                places = np.linspace(0, 1, 201 if SHARE >= 1 else 51)
+                poses = [screw.mul(x, screw.from_twist(screw.scaled(twist, s))) for s in places]
+                rooms = [tool_room(g, pose, 0.02) for pose in poses]
+                assert not answer or min(rooms) >= -1e-9
+                refused += not answer and min(rooms) > 1e-3
+    assert SHARE < 1 or (min(counts) > 30 and refused <= 3)
+
+
 def test_the_clearance_does_not_depend_on_the_frame_of_the_world():
     rng = np.random.default_rng(2)
     arm = random_arm(2, 5, 0.3)
@@ -410,11 +517,11 @@ def test_the_clearance_does_not_depend_on_the_frame_of_the_world():
 
 
 def test_later_means_where_the_obstacle_will_be():
-    ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0, 0, 1.0]), (0.0, 0.0, -0.4))
+    ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.1, 0.2, 1.0]), (0.2, 0.3, -0.4))
     g = work_of(gantry(), POINT, [ball])
     for seconds in (0.0, 0.5, 1.0):
         later = work_of(gantry(), POINT, [ball.at(seconds)])
         here = room_at(g, np.zeros(3), seconds, 9.0)
         assert here == pytest.approx(room_at(later, np.zeros(3), 0.0, 9.0), abs=1e-12)
-        assert here == pytest.approx(1.0 - 0.4 * seconds - 0.13, abs=1e-12)
+        assert here == pytest.approx(np.linalg.norm(ball.at(seconds).pose.position) - 0.13, abs=1e-12)
     assert g[SETTINGS, SELF_MARGIN] == 0.015

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import os
 import pickle
@@ -83,6 +84,51 @@ BAD = {
     "no segment ranges": (drop("segment_ranges"), "segment_ranges: is missing, although other segment entries"),
     "tilted reference": (change("segment_reference_poses", (0, 3), 9.0), "segment_reference_poses: the quaternion at"),
     "flat sizes": (replace("object_sizes", np.zeros((2, 2))), r"object_sizes: has shape \(2, 2\); expected \(2, 3\)"),
+    "flat ranges": (replace("segment_ranges", [1, 2]), r"segment_ranges: is int64 of shape \(2,\); expected whole"),
+    "float ranges": (replace("segment_ranges", [[0.0, 169.0], [170.0, 515.0]]), "segment_ranges: is float64 of shape"),
+    "three ranges": (
+        replace("segment_ranges", [[0, 9], [10, 20], [21, 30]]),
+        "segment_ranges: does not have 2 entries",
+    ),
+    "numbers as segment names": (replace("segment_names", [1, 2]), "segment_names: is not a list of texts"),
+    "single segment name": (replace("segment_names", "approach"), "segment_names: is not a list of texts"),
+    "flat reference pose": (
+        replace("segment_reference_poses", np.zeros(7)),
+        "segment_reference_poses: is not an array",
+    ),
+    "reference 100 m away": (
+        change("segment_reference_poses", (1, 0), 100.0),
+        "segment 'transfer': the reference pose is 100 m away; is it in cm or mm",
+    ),
+    "unknown reference": (
+        replace("segment_references", ["cubeX", "cubeB"]),
+        "segment 'approach': reference 'cubeX' is not in object_names; allowed: cubeA, cubeB, ''",
+    ),
+    "unknown object in the hand": (replace("segment_held", ["", "cup"]), "segment 'transfer': held 'cup' is not in"),
+    "negative size": (change("object_sizes", (1, 2), -0.05), "object_sizes: of 'cubeB' is .*; expected three positive"),
+    "zero size": (change("object_sizes", (0, 0), 0.0), "object_sizes: of 'cubeA' is .*; expected three positive"),
+    "doubled object": (
+        replace("object_names", ["cubeA", "cubeA"]),
+        "object_names: are not unique names: 'cubeA', 'cubeA'",
+    ),
+    "object names in a table": (
+        replace("object_names", [["cubeA"], ["cubeB"]]),
+        "object_names: is not a list of texts",
+    ),
+    "text sizes": (
+        replace("object_sizes", lambda a: a["object_sizes"].astype(str)),
+        "object_sizes: is not an array of",
+    ),
+    "six joints of a Panda": (
+        replace("joint_positions", lambda a: a["joint_positions"][:, :6]),
+        "joint_positions: has 6 columns; the Panda has 7 joints",
+    ),
+    "text joints": (
+        replace("joint_positions", lambda a: a["joint_positions"].astype(str)),
+        "joint_positions: is not an array of numbers",
+    ),
+    "complex gripper": (replace("gripper", lambda a: a["gripper"] + 0j), "gripper: is not an array of numbers"),
+    "text gripper": (replace("gripper", lambda a: a["gripper"].astype(str)), "gripper: is not an array of numbers"),
     **{
         f"no {key}": (drop(key), f"{key}: is missing; a demonstration holds: {', '.join(REQUIRED)}") for key in REQUIRED
     },
@@ -100,6 +146,34 @@ def test_a_bad_demonstration_is_refused_in_one_line_that_names_file_and_key(name
         load_demonstration(path)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("value", [["0", "1"], np.array([0j, 1j]), [None, 1.0]])
+def test_a_demonstration_made_in_code_takes_real_numbers_only(value):
+    demo = load_demonstration(shipped_demonstration("stack"))
+    with pytest.raises(BadDemonstration, match="stack: time: is not an array of real numbers"):
+        dataclasses.replace(demo, time=value)
+
+
+def test_names_need_no_sizes_and_another_robot_may_be_the_teacher():
+    demo = load_demonstration(shipped_demonstration("stack"))
+    assert dataclasses.replace(demo, object_sizes={}).segments[0].reference == "cubeA"
+    six = dataclasses.replace(demo, robot="UR5e", joint_positions=demo.joint_positions[:, :6])
+    assert six.robot == "UR5e"
+    assert not demo.object_sizes["cubeA"].flags.writeable
+
+
+def test_a_demonstration_that_cannot_be_written_leaves_no_file(tmp_path, monkeypatch):
+    demo = load_demonstration(shipped_demonstration("stack"))
+
+    def full(file, **arrays):
+        file.write(b"begun")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    with pytest.raises(OSError, match="No space left"):
+        save_demonstration(demo, tmp_path / "new.npz")
+    assert list(tmp_path.iterdir()) == []
 
 
 def npy(array) -> bytes:

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from arms import READY, panda
+from arms import READY, free_panda, joints_at, panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import assert_same_pose
@@ -58,20 +61,46 @@ def test_a_fraction_of_the_screw_slows_the_gain_down_and_still_arrives():
     assert Pursuit(arm, path, DT, settings=slow).roll_out(READY).arrived
 
 
-@pytest.mark.parametrize("tau", [1.0, 0.3, 0.01])
-def test_ideal_tracking_is_the_recurrence_of_screw_steps(tau):
-    """c <- S(tau gain dt; c, d): the commanded twist, kept for a tick, is that fraction of the screw."""
-    arm, path = a_path(2, step=0.004)
-    settings_ = PursuitSettings(tau=tau)
-    pursuit, q = Pursuit(arm, path, DT, controller=UNHURRIED, settings=settings_), READY.copy()
-    for _ in range(30):
+@pytest.mark.parametrize(
+    "tau, gain, dt", [(1.0, 15.0, 0.02), (0.3, 15.0, 0.02), (0.01, 1000.0, 0.001)], ids=["log law", "slow", "paper"]
+)
+def test_ideal_tracking_is_the_recurrence_of_screw_steps_and_ends_at_the_end(tau, gain, dt):
+    """c <- S(tau gain dt; c, d'_i) until within tolerance; with gain dt = 1 that is the paper's c <- S(tau; c, d'_i).
+
+    The recurrence is that of a tool that keeps the commanded twist for a tick: the joints follow it exactly.
+    """
+    path = screw_path(free_panda().fk(READY), panda().fk(READY + 0.1), 0.004)
+    arm, chosen, radius = free_panda(), replace(UNHURRIED, gain=gain), 0.01
+    pursuit = Pursuit(arm, path, dt, controller=chosen, settings=PursuitSettings(tau=tau, capture_radius=radius))
+    c, q, index, checked = path[0].dq, READY, 0, Counter()
+    for _ in range(4000):
+        while index < len(path) - 1 and np.hypot(*np.array(dq.gap(c, path[index].dq)) * [1, 0.2]) <= radius:
+            index += 1
         status, qdot = pursuit.step(q)
-        x, body = arm.fk_jacobian(q)
-        if status == FOLLOWING and np.abs(qdot).max() < 2.0:
-            moved = dq.mul(x, dq.dq_from_twist(DT * body @ qdot))
-            target = path[pursuit.index].dq
-            assert_same_pose(moved, dq.sclerp(x, target, tau * UNHURRIED.gain * DT), 1e-10)
-        q = q + DT * qdot
+        assert pursuit.index == index
+        if status != FOLLOWING:
+            break
+        moved = dq.mul(c, dq.dq_from_twist(dt * arm.jacobian(q) @ qdot))
+        c = dq.sclerp(c, path[index].dq, tau * gain * dt)
+        assert_same_pose(moved, c, 1e-10)
+        q = joints_at(arm, c, q)
+        checked[index] += 1
+    assert status == ARRIVED
+    assert sum(checked.values()) > 20
+    assert len(checked) > 5
+    distance, angle = dq.gap(c, path[-1].dq)
+    assert distance <= 1e-3
+    assert angle <= 1e-2
+
+
+def test_the_papers_tau_of_a_hundredth_ends_within_tolerance():
+    arm, path = a_path(2, step=0.004)
+    settings_ = PursuitSettings(tau=0.01)
+    for gain, dt in ((1000.0, 0.001), (15.0, 0.02)):
+        controller = ControllerSettings(gain=gain)
+        result = Pursuit(arm, path, dt, controller=controller, settings=settings_).roll_out(READY, max_seconds=200.0)
+        assert (result.arrived, result.reason) == (True, "")
+        assert (np.array(arm.fk(result.q).gap(path[-1])) <= [1e-3, 1e-2]).all()
 
 
 def test_the_reference_is_the_first_pose_beyond_the_capture_radius():

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from strategies import assert_same_pose, random_path
 
+from onedemo.bench.cli import main
 from onedemo.configs.shipped import shipped_demonstration
 from onedemo.envs.scene import robot_arm
 from onedemo.planner.demo_io import load_demonstration
@@ -19,15 +21,73 @@ RAW = Path(__file__).parents[3] / "shared/data/panda_teleop_stack.npz"
 needs_raw = pytest.mark.skipif(not RAW.exists(), reason="the raw recording is not here")
 
 
+POSE_ROUNDING = 1e-14
+"""Poses go through sines and cosines, whose last bits differ between machines."""
+
+
 @needs_raw
-def test_the_shipped_demonstration_is_the_import_of_the_raw_recording():
-    shipped = load_demonstration(shipped_demonstration("stack"))
-    made = stack_from_teleoperation(RAW, robot_arm("Panda"), name="stack", licence=shipped.licence)
-    np.testing.assert_array_equal(made.time, shipped.time)
-    np.testing.assert_array_equal(made.gripper, shipped.gripper)
-    np.testing.assert_allclose(made.path.vectors, shipped.path.vectors, atol=1e-9)
-    ours = [(s.name, s.start, s.stop, s.reference, s.held, s.gripper) for s in made.segments]
-    assert ours == [(s.name, s.start, s.stop, s.reference, s.held, s.gripper) for s in shipped.segments]
+def test_the_shipped_demonstration_is_what_the_documented_command_makes(tmp_path, monkeypatch):
+    licence, output = "MIT, see LICENSE-robosuite.txt", tmp_path / "stack.npz"
+    readme = " ".join((Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8").split())
+    assert f'onedemo demo import panda_teleop_stack.npz -o stack.npz --licence "{licence}"' in readme
+    command = ["onedemo", "demo", "import", str(RAW), "-o", str(output), "--licence", licence]
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 0
+    made, shipped = np.load(output), np.load(shipped_demonstration("stack"))
+    assert made.files == shipped.files
+    for key in made.files:
+        assert (made[key].dtype, made[key].shape) == (shipped[key].dtype, shipped[key].shape), key
+        if key in ("poses", "segment_reference_poses"):
+            np.testing.assert_allclose(made[key], shipped[key], rtol=0, atol=POSE_ROUNDING)
+        else:
+            np.testing.assert_array_equal(made[key], shipped[key], err_msg=key)
+
+
+def teleoperation(count=12):
+    """A short recording like the shipped one: the hand closes, then opens."""
+    t = np.arange(count) / 20.0
+    grip = np.where((t > 0.15) & (t < 0.4), 1.0, -1.0)
+    cube = np.tile([0.1, 0.0, 0.83, 1.0, 0.0, 0.0, 0.0], (count, 1))
+    q = np.tile([0.0, 0.2, 0.0, -2.2, 0.0, 2.4, 0.78, 0.04, 0.04], (count, 1)) + 0.01 * t[:, None]
+    actions = np.column_stack([np.zeros((count, 6)), grip])
+    return {"t": t, "q": q, "actions": actions, "obj_cubeA_jnt0": cube, "obj_cubeB_jnt0": cube + 0.1 * np.eye(7)[0]}
+
+
+def at(array, index, value):
+    array = array.copy()
+    array[index] = value
+    return array
+
+
+@pytest.mark.parametrize(
+    "key, change, message",
+    [
+        ("q", lambda q: q[:, 0], r"q: is not an array of numbers with 2 dim"),
+        ("q", lambda q: q.astype(str), r"q: is not an array of numbers"),
+        ("q", lambda q: q[:, :5], r"q: has 5 columns; the Panda has 7 joints"),
+        ("q", lambda q: q[:-1], r"q: has 11 samples; t has 12"),
+        ("q", lambda q: at(q, (4, 2), np.nan), r"q: is not finite at index 4"),
+        ("actions", lambda a: a[:, -1], r"actions: is not an array of numbers with 2 dim"),
+        ("actions", lambda a: a[:, :0], r"actions: has shape \(12, 0\)"),
+        ("actions", lambda a: at(a, (3, 6), np.inf), r"actions: is not finite at index 3"),
+        ("actions", lambda a: at(a, (slice(None), 6), -1.0), r"actions: the gripper changes 0 times"),
+        ("obj_cubeA_jnt0", lambda o: o[:3], r"obj_cubeA_jnt0: has 3 samples; t has 12"),
+        ("obj_cubeB_jnt0", lambda o: o[0], r"obj_cubeB_jnt0: is not an array of numbers with 2 dim"),
+        ("t", lambda t: t[::-1], r"time: does not increase at index 1"),
+        ("t", lambda t: t[:, None], r"t: is not an array of numbers with 1 dim"),
+    ],
+)
+def test_bad_teleoperations_are_named_with_file_and_index(key, change, message, tmp_path):
+    path, arrays = tmp_path / "raw.npz", teleoperation()
+    np.savez(path, **arrays)
+    assert len(stack_from_teleoperation(path, robot_arm("Panda"), name="x", licence="y").segments) == 2
+    np.savez(path, **{**arrays, key: change(arrays[key])})
+    with pytest.raises(BadDemonstration, match=message) as caught:
+        stack_from_teleoperation(path, robot_arm("Panda"), name="x", licence="y")
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
 
 
 def test_the_recorded_joints_give_the_recorded_path():
@@ -126,6 +186,14 @@ def test_a_rest_is_found_and_a_short_stop_is_not():
     time = np.arange(len(path)) / 50.0
     assert dwells(time, path) == [(len(move) - 1, len(move) + 30)]
     assert dwells(0.1 * time, path) == []
+
+
+def test_a_hand_that_never_moves_rests_all_the_time():
+    """Off the origin the distance of a pose to itself is rounding, not zero."""
+    pose = Pose.from_position_quaternion([0.43, -0.21, 0.87], np.array([0.3, -0.5, 0.7, 0.2]) / np.sqrt(0.87))
+    still = PosePath(np.repeat(pose.dq[None], 50, axis=0))
+    assert 0 < still.lengths()[-1] < 1e-12
+    assert dwells(np.arange(50) / 50.0, still) == [(0, 49)]
 
 
 def test_resampling_keeps_ends_and_makes_equal_steps():

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from random_scenes import SHAPES, at, boxes, random_tool, tool_gap, tool_problem
+from random_scenes import Gauge, at, boxes, random_tool, tool_gap, tool_problem
 from solids import KINDS as FORMS
-from solids import random_pose, random_shape
-from strategies import for_all, random_dq, st
+from solids import random_pose, random_shape, true_distance
+from strategies import assert_same_pose, for_all, known_defect, random_dq, st
 
 from onedemo.planner import dualquat as dq
 from onedemo.planner import screw
+from onedemo.planner.clearance import find_near
 from onedemo.planner.edges import is_clear, place_tool, point_speeds, slide_is_clear, tool_work
 from onedemo.planner.edges import screw_is_clear as screw_clear
-from onedemo.planner.clearance import find_near
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, OneDemoError
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.repet import (
-    MAX_OBSTACLES, VERDICTS, EscapeTree, RepetSettings, TangentPlane, clear_of, escape_path, point_tool,
-)  # fmt: skip
+    MAX_OBSTACLES,
+    VERDICTS,
+    EscapeTree,
+    RepetSettings,
+    TangentPlane,
+    clear_of,
+    escape_path,
+    point_tool,
+)
 from onedemo.planner.robot_work import W_REACH, WORLD
 from onedemo.planner.shapes import Box, Obstacle, Sphere, pack
 from onedemo.planner.tsia import screw_path
@@ -55,14 +62,18 @@ def least_gap(path: PosePath, tool: np.ndarray, obstacles, keep: float) -> float
     A look at distance D says all of the next (D - keep) meters, which are passed over; so a value above `keep` is a
     bound only.
     """
-    least = np.inf
-    for x, y in zip(path, path[1:], strict=False):
-        poses, k = between(x, y, tool), 0
-        while k < len(poses):
-            gap = tool_gap(tool, obstacles, Pose(poses[k]))
+    gauge = Gauge(tool, obstacles)
+    least, ahead = gauge(path[-1]), 0
+    for x, y in pairwise(path):
+        poses = between(x, y, tool)
+        while ahead < len(poses):
+            gap = gauge(Pose(poses[ahead]))
             least = min(least, gap)
-            k += max(1, int((gap - keep) / FINE))
-    return min(least, tool_gap(tool, obstacles, path[-1]))
+            if gap < keep - 1e-3:
+                return least
+            ahead += max(1, int((gap - keep) / FINE))
+        ahead -= len(poses)
+    return least
 
 
 def shortest(path: PosePath) -> float:
@@ -91,9 +102,17 @@ def test_a_path_that_was_found_keeps_the_distance_and_both_ends(kind):
         if escape.found:
             found += 1
             assert least_gap(escape.path, tool, obstacles, DEFAULTS.distance) >= DEFAULTS.distance - 1e-6
-            np.testing.assert_array_equal(escape.path.dqs[0], path.dqs[0])
-            np.testing.assert_array_equal(np.abs(escape.path.dqs[-1]), np.abs(path.dqs[-1]))
+            assert_same_pose(escape.path.dqs[[0, -1]], path.dqs[[0, -1]], 1e-15)
     assert found >= 5
+
+
+@known_defect("write_edge puts the last pose of a slide together anew from place and turn: it is off by 1e-17")
+def test_both_ends_are_exact():
+    for seed in range(6):
+        path, tool, obstacles = tool_problem("convex", seed)
+        escape = escape_path(path, tool, obstacles, seed=seed)
+        np.testing.assert_array_equal(escape.path.dqs[0], path.dqs[0])
+        np.testing.assert_array_equal(np.abs(escape.path.dqs[-1]), np.abs(path.dqs[-1]))
 
 
 @pytest.mark.slow
@@ -158,22 +177,23 @@ def test_what_is_far_away_changes_no_bit(seed):
 # Its parts: the bound (28), certified edges, clearances
 
 
-@for_all(st.integers(0, 10**6))
+@for_all(st.integers(0, 10**6), max_examples=40)
 def test_the_bound_of_an_edge_is_no_less_than_the_way_of_any_point(seed):
     rng = np.random.default_rng(seed)
     tool, x, y = random_tool(rng), Pose(random_dq(rng)), Pose(random_dq(rng))
     work = tool_work(tool, pack([]))
     fastest = point_speeds(work, screw.twist_of(screw.mul(screw.conj(tuple_of(x)), tuple_of(y))))
-    poses = [Pose(row) for row in dq.sclerp(x.dq, y.dq, np.linspace(0, 1, 2000))]
-    longest = []
-    for row, bound in zip(tool, work[WORLD : WORLD + len(tool), W_REACH], strict=True):
-        ends = [row[:3], row[3:6], row[:3] + rng.uniform() * (row[3:6] - row[:3])]
-        tracks = np.array([[pose.rotation @ end + pose.position for end in ends] for pose in poses])
-        lengths = np.linalg.norm(np.diff(tracks, axis=0), axis=2).sum(axis=0)
-        assert (lengths <= bound + 1e-12).all()
-        assert lengths[:2].max() == pytest.approx(bound, rel=1e-5), "the bound is one of the ends' ways"
-        longest.append(bound)
-    assert fastest == max(longest)
+    bounds = work[WORLD : WORLD + len(tool), W_REACH]
+    poses = [Pose(row) for row in dq.sclerp(x.dq, y.dq, np.linspace(0, 1, 400))]
+    turns, places = np.array([pose.rotation for pose in poses]), np.array([pose.position for pose in poses])
+    inside = tool[:, :3] + rng.uniform(size=(len(tool), 1)) * (tool[:, 3:6] - tool[:, :3])
+    ways = []
+    for points in (tool[:, :3], tool[:, 3:6], inside):
+        track = np.einsum("kij,mj->kmi", turns, points) + places[:, None]
+        ways.append(np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0))
+    assert (np.array(ways) <= bounds + 1e-12).all()
+    np.testing.assert_allclose(np.maximum(ways[0], ways[1]), bounds, rtol=1e-4, err_msg="an end goes that far")
+    assert fastest == bounds.max()
 
 
 def some_edge(rng, turned: bool):
@@ -242,6 +262,12 @@ def test_distances_of_a_tool_are_those_of_another_library():
     assert clear_of(Pose.identity(), point_tool(0.1), []) == 1.0
 
 
+@known_defect("clear_of takes the margin of an obstacle that has one off its distance")
+def test_the_distance_of_a_tool_knows_no_margins():
+    ball = Obstacle(Sphere(0.1), at([0.5, 0.0, 0.0]), margin=0.05)
+    assert clear_of(Pose.identity(), point_tool(0.1), [ball]) == pytest.approx(0.3, abs=1e-12)
+
+
 # The tree as data
 
 
@@ -263,9 +289,11 @@ def test_a_tree_is_consistent(kind, seed, orientation):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_children_lie_in_planes_that_touch_at_the_closest_point(seed):
-    """The paper's invariant; the normal is compared with how another library's distance grows."""
+    """The paper's invariant; the normal is compared with how the distance by other means grows."""
     path, tool, obstacles = tool_problem("convex", seed)
+    tool = tool[:1]  # of several parts the second nearest would have its say
     tree = escape_path(path, tool, obstacles).tree
+    step = 1e-3
     positions = PosePath(tree.poses).positions
     opened = sorted(set(tree.parents[1:]))
     for row, plane in zip(opened, tree.planes, strict=True):
@@ -277,22 +305,23 @@ def test_children_lie_in_planes_that_touch_at_the_closest_point(seed):
         children = np.flatnonzero(tree.parents == row)
         assert len(children) == 8
         assert np.abs((positions[children] - plane.origin) @ plane.normal).max() < 1e-12
-        pose, step = Pose(tree.poses[row]), 1e-4
-        ahead, back = (tool_gap(tool, obstacles, at(sign * step * plane.normal) @ pose) for sign in (1, -1))
-        here = tool_gap(tool, obstacles, pose)
-        # the distance grows one for one towards the normal, unless two parts of the tool are equally near
-        assert ahead >= here + step - 1e-7
-        if (ahead - here) - (here - back) < 0.01 * step:
-            assert (ahead - back) / (2 * step) == pytest.approx(1.0, abs=1e-2)
+        pose = Pose(tree.poses[row])
+        a, b = (pose.rotation @ end + pose.position for end in (tool[0, :3], tool[0, 3:6]))
+        here, ahead, back = (
+            true_distance(obstacles[0], a + way * plane.normal, b + way * plane.normal) for way in (0.0, step, -step)
+        )
+        # the closest points of convex bodies part one for one along the line between them
+        assert ahead - here == pytest.approx(step, abs=1e-7)
+        assert here - back == pytest.approx(step, abs=1e-7)
 
 
 @pytest.mark.parametrize("kind, seed", [("trap", 1), ("clutter", 6), ("cage", 2)])
 def test_verdicts_say_why(kind, seed):
     path, tool, obstacles = tool_problem(kind, seed)
-    settings = RepetSettings(nodes=120)
+    settings = RepetSettings(nodes=120, retries=0)
     tree = escape_path(path, tool, obstacles, settings, seed=seed).tree
-    kept = [tuple(np.floor(Pose(tree.poses[k]).position / (settings.cell * settings.step) + 0.5)) for k in kept_rows(tree)]
-    assert len(set(kept)) == len(kept), "of two in one cell one is kept"
+    cells = np.floor(PosePath(tree.poses).positions[kept_rows(tree)] / (settings.cell * settings.step) + 0.5)
+    assert len(np.unique(cells, axis=0)) == len(cells), "of two in one cell one is kept"
     for k in range(1, len(tree.poses)):
         edge = PosePath(tree.poses[[tree.parents[k], k]])
         if tree.verdicts[k] in (KEPT, HOME, VISITED):
@@ -314,9 +343,10 @@ def test_moving_the_world_moves_the_escape(kind):
 
     The grid of visited places does not: it lies along the world's axes. With cells that hold one node each it decides
     nothing. What else could: a path that runs head-on into a normal (the basis then falls back on an axis), and nodes
-    of equal cost (rounding decides); random problems have neither.
+    of equal cost (rounding decides); random problems have neither. The spacing is no fraction of the step, so that
+        rounding does not decide how many poses an edge gets.
     """
-    settings = RepetSettings(basis="goal", cell=1e-3, retries=0)
+    settings = RepetSettings(basis="goal", cell=1e-3, retries=0, spacing=0.0137)
     for seed in range(8):
         path, tool, obstacles = tool_problem(kind, seed)
         change = Pose(random_dq(np.random.default_rng(seed)))
@@ -368,9 +398,9 @@ def test_settings_out_of_range_are_refused_in_one_line(values):
     "values",
     [
         {"trigger": "shell"}, {"basis": "world"}, {"cost": "goal"}, {"square": True}, {"orientation": "spread"},
-        {"orientation": "turn"}, {"pull_back": True}, {"shortcut": False}, {"step": 0.02}, {"step": 0.12},
+        {"orientation": "turn"}, {"pull_back": True}, {"shortcut": False}, {"step": 0.04}, {"step": 0.12},
         {"levels": 20}, {"beam": 4}, {"distance": 0.0}, {"shell": 0.2}, {"random": 0}, {"random": 30}, {"away": 0.0},
-        {"candidates": 1}, {"cell": 2.0}, {"nodes": 1000}, {"spacing": 0.05}, {"retries": 0}, {"bias": (0, 1, 0)},
+        {"candidates": 1}, {"cell": 2.0}, {"nodes": 3000}, {"spacing": 0.05}, {"retries": 0}, {"bias": (0, 1, 0)},
     ],
     ids=str,
 )  # fmt: skip
@@ -398,21 +428,21 @@ def slot(width: float, height: float) -> list[Obstacle]:
 
 
 def test_a_long_bar_turns_to_pass_a_slot():
-    bar = np.array([[0.0, -0.2, 0.0, 0.0, 0.2, 0.0, 0.02]])
-    inside = ((-0.5, -0.3, -0.3), (0.5, 0.3, 0.3))
-    common = {"workspace": inside, "levels": 20}
-    assert escape_path(ALONG, bar, slot(0.2, 0.7), RepetSettings(**common)).reason == "no escape found"
-    escape = escape_path(ALONG, bar, slot(0.2, 0.7), RepetSettings(orientation="turn", **common))
+    bar, wall = np.array([[0.0, -0.2, 0.0, 0.0, 0.2, 0.0, 0.02]]), slot(0.2, 0.7)
+    common = {"workspace": ((-0.35, -0.2, -0.2), (0.35, 0.2, 0.2)), "levels": 20, "turn": 1.5}
+    assert escape_path(ALONG, bar, wall, RepetSettings(**common)).reason == "no escape found"
+    escape = escape_path(ALONG, bar, wall, RepetSettings(orientation="turn", **common))
     assert escape.found
-    assert least_gap(escape.path, bar, slot(0.2, 0.7), 0.02) >= 0.02 - 1e-6
-    turned = max(pose.gap(Pose.identity())[1] for pose in escape.path)
-    assert turned > 0.5
+    assert least_gap(escape.path, bar, wall, DEFAULTS.distance) >= DEFAULTS.distance - 1e-6
+    assert max(pose.gap(Pose.identity())[1] for pose in escape.path) > 1.2
 
 
 def test_a_turn_is_of_the_angle_that_is_set():
     path, tool, obstacles = tool_problem("cage", 0)
     tree = escape_path(path, tool, obstacles, RepetSettings(orientation="turn", turn=0.3, retries=0, nodes=200)).tree
-    angles = np.array([Pose(tree.poses[tree.parents[k]]).gap(Pose(tree.poses[k]))[1] for k in range(1, len(tree.poses))])
+    angles = np.array(
+        [Pose(tree.poses[tree.parents[k]]).gap(Pose(tree.poses[k]))[1] for k in range(1, len(tree.poses))]
+    )
     assert (angles > 0.1).any()
     np.testing.assert_allclose(angles[angles > 1e-6], 0.3, atol=1e-9)
 
@@ -459,7 +489,7 @@ def test_the_distance_is_kept_and_own_margins_go_first():
         escape = escape_path(ALONG, BALL, plain, settings)
         least = least_gap(escape.path, BALL, plain, distance)
         assert escape.found and distance - 1e-6 <= least < distance + 0.06
-    for margin in (0.0, 0.1):
+    for margin in (0.0, 0.05):
         own = [Obstacle(Box((0.1, 0.1, 0.1)), margin=margin)]
         escape = escape_path(ALONG, BALL, own)
         assert escape.found
@@ -529,7 +559,8 @@ def test_a_bias_chooses_the_side(axis, sign):
 def test_nodes_stay_in_the_workspace():
     box = ((-1.0, -1.0, -0.02), (1.0, 1.0, 1.0))
     ball = [Obstacle(Sphere(0.06), at([0, 0, 0.01]))]
-    assert escape_path(ALONG, BALL, ball).path.positions[:, 2].min() < -0.02 or True
+    free = escape_path(ALONG, BALL, ball, RepetSettings(bias=(0.0, 0.0, -1.0)))
+    assert free.path.positions[:, 2].min() < -0.05, "without walls it goes below"
     escape = escape_path(ALONG, BALL, ball, RepetSettings(workspace=box, bias=(0.0, 0.0, -1.0)))
     assert escape.found
     tree = escape.tree
@@ -604,12 +635,16 @@ def test_a_detour_that_does_not_fit_is_a_failure_of_its_own():
     assert escape.path is ALONG
 
 
-def test_later_candidates_are_looked_at_too():
-    """Behind the first way back stands a second obstacle; with one candidate the tree must come back before it."""
-    path, tool, obstacles = tool_problem("trap", 2)
-    for count in (1, 2, 8):
-        escape = escape_path(path, tool, obstacles, RepetSettings(candidates=count))
-        assert escape.found
+def test_the_way_back_may_be_later_than_the_first_free_pose():
+    """Behind the obstacle the path runs through a box that is open only at the far end."""
+    path = screw_path(at([-0.3, 0.0, 0.0]), at([0.6, 0.0, 0.0]), 0.01)
+    cell = [Obstacle(Box((0.02, 0.3, 0.3)))]
+    cell += [Obstacle(Box((0.3, 0.02, 0.3)), at([0.15, y, 0.0])) for y in (-0.16, 0.16)]
+    cell += [Obstacle(Box((0.3, 0.3, 0.02)), at([0.15, 0.0, z])) for z in (-0.16, 0.16)]
+    one, eight = (escape_path(path, BALL, cell, RepetSettings(candidates=count, nodes=20_000)) for count in (1, 8))
+    assert one.reason == "no escape found", "the way in from the far end is too long"
+    assert eight.found
+    assert eight.path[eight.detours[0][1]].position[0] > 0.3
 
 
 # Bad input and honest failures
@@ -654,7 +689,7 @@ def test_what_is_not_a_number_is_refused():
             escape_path(ALONG, tool, [])
     with pytest.raises(NotFinite):
         Obstacle(Sphere(0.1), velocity=np.array([np.nan, 0, 0]))
-    with pytest.raises(BadOption, match="longest|poses"):
+    with pytest.raises(BadOption, match="has 61 poses; allowed are 10"):
         escape_path(ALONG, BALL, [], RepetSettings(longest=10))
 
 
@@ -664,8 +699,4 @@ def test_a_tool_without_parts_passes_everything():
 
 @for_all(st.integers(-(2**70), 2**70), max_examples=20)
 def test_any_whole_number_is_a_seed(seed):
-    assert escape_path(ALONG, BALL, [Obstacle(Sphere(0.06))], replace(DEFAULTS), seed=seed).found
-
-
-def test_every_shape_is_drawn():
-    assert set(SHAPES) == {"sphere", "capsule", "box", "cylinder", "mesh"}
+    assert escape_path(ALONG, BALL, [Obstacle(Sphere(0.06))], seed=seed).found

@@ -179,6 +179,27 @@ def test_short_still_and_repeating_demonstrations_are_imitated(rows):
         assert_same_pose(two_sided_path(shown, start, goal).dqs[[0, -1]], np.stack([start.dq, goal.dq]), 1e-12)
 
 
+@for_all(seeds, st.integers(2, 40))
+def test_a_demonstration_that_stands_still_off_the_origin_is_imitated(seed, count):
+    """The distance of such a pose to itself is rounding, not zero: no measure of steps or lengths."""
+    _, _, start, goal = a_case(seed)
+    still = PosePath(np.repeat(Pose(random_dq(np.random.default_rng(seed + 1))).dq[None], count, axis=0))
+    imitated = imitated_path(still, goal)
+    assert guide_index(imitated) == count - 1
+    path = final_path(start, imitated, guide_index(imitated))
+    assert len(path) < 2000
+    assert np.diff(path.lengths()).max() < 0.0051
+    assert_same_pose(path.dqs[[0, -1]], np.stack([start.dq, goal.dq]), 0.0)
+    steps = np.diff(two_sided_path(still, start, goal).lengths())
+    assert steps.max() <= 1.6 * steps.sum() / (count - 1), "a smooth step over the index"
+
+
+def test_a_demonstration_of_micrometres_does_not_make_a_blend_of_millions():
+    tiny = PosePath(np.array([Pose.from_yaw([1e-8 * k, 0.3, 0.2], 0.0).dq for k in range(10)]))
+    path = final_path(Pose.from_yaw([0, 1, 0], 1.0), tiny, guide_index(tiny))
+    assert len(path) < 200_000
+
+
 @for_all(seeds, st.floats(0.01, 2))
 def test_a_screw_path_has_exact_ends_and_even_steps(seed, step):
     _, _, start, end = a_case(seed)
