@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+READY = np.array([0.0, 0.2, 0.0, -2.6, 0.0, 2.9, 0.78])
+"""Joints of the Panda at which kinematics are measured."""
 Call = Callable[[], object]
 
 

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from fnmatch import fnmatch
-from importlib import import_module
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,8 @@ import numpy as np
 from ..planner.errors import UnknownName
 from .console import check_writable, console, labeled, writing
 from .measuring import Row, row, seconds_per_call
+from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
+from .perf_planner import LINES
 
 SWAY_STEPS = 50
 """Control steps in which the arm of the measured scene sways once."""
@@ -39,27 +40,15 @@ def _panda() -> tuple[Any, np.ndarray, np.ndarray]:
     from ..planner.controller import ControllerSettings
     from ..planner.workspace import bound
 
-    arm = Arm.from_urdf(_panda_urdf(), tcp_frame="panda_link8")
-    q = np.array([0.0, 0.2, 0.0, -2.6, 0.0, 2.9, 0.78])
-    return bound(arm, ControllerSettings(law="paper").packed()), q, np.array(arm.fk(q + 0.1).dq)
+    arm = Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8")
+    return bound(arm, ControllerSettings(law="paper").packed()), READY, np.array(arm.fk(READY + 0.1).dq)
 
 
 def _kinematics() -> Row:
-    import pinocchio as pin
-
     from ..planner.workspace import refresh
 
     work, q, _ = _panda()
-    model = pin.buildModelFromUrdf(str(_panda_urdf()))
-    data, frame = model.createData(), model.getFrameId("panda_link8")
-
-    def pinocchio() -> np.ndarray:
-        """The same two results: the Jacobian in the frame's own axes, and the frame's pose."""
-        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.ReferenceFrame.LOCAL)
-        pin.updateFramePlacement(model, data, frame)
-        return jacobian
-
-    ours, theirs = seconds_per_call(lambda: refresh(work, q), pinocchio)
+    ours, theirs = seconds_per_call(lambda: refresh(work, q), pinocchio_kinematics(q))
     note = f"{ours * 1e6:.2f} us against {theirs * 1e6:.2f} us (computeFrameJacobian, updateFramePlacement)"
     return row(KINEMATICS, ours / theirs, "ratio", 0.7, note)
 
@@ -67,36 +56,13 @@ def _kinematics() -> Row:
 def _tick() -> Row:
     from ..planner.controller import tick
 
-    goal = 1 / 12
-    try:
-        peer = import_module("dqrobotics")
-        robots, algebra = import_module("dqrobotics.robots"), import_module("dqrobotics.utils.DQ_LinearAlgebra")
-    except ImportError:
-        return Row(TICK, None, "ratio", goal, None, "needs: pip install 'onedemo[peers]'")
     (work, q, target), qdot = _panda(), np.empty(7)
-    robot = robots.FrankaEmikaPandaRobot.kinematics()
-    goal_pose, one, c8, pull = peer.DQ(target), peer.DQ([1.0]), peer.C8(), -0.1 * q
-
-    def theirs() -> np.ndarray:
-        """The same law with the peer's own algebra, pseudo-inverse and null-space projection included."""
-        error = (one - peer.conj(robot.fkm(q)) * goal_pose).vec8()
-        n = peer.haminus8(goal_pose) @ c8 @ robot.pose_jacobian(q)
-        inverse = algebra.pinv(n)
-        return inverse @ (15.0 * error) + pull - inverse @ (n @ pull)
-
-    mine, peers = seconds_per_call(lambda: tick(work, q, target, 1.0, qdot), theirs)
-    note = f"{mine * 1e6:.2f} us against {peers * 1e6:.1f} us, the corrected paper law with null space"
-    return row(TICK, mine / peers, "ratio", goal, note)
-
-
-def _panda_urdf() -> Path:
-    """Path of the Panda description that robosuite ships, found without importing it."""
-    from importlib.util import find_spec
-
-    spec = find_spec("robosuite")
-    assert spec is not None and spec.origin is not None
-    folder = Path(spec.origin).parent / "models/assets/bullet_data/panda_description/urdf"
-    return folder / "panda_arm.urdf"
+    peer = dq_robotics_tick(q, target)
+    if peer is None:
+        return Row(TICK, None, "ratio", 1 / 12, None, "needs: pip install 'onedemo[peers]'")
+    mine, theirs = seconds_per_call(lambda: tick(work, q, target, 1.0, qdot), peer)
+    note = f"{mine * 1e6:.2f} us against {theirs * 1e6:.1f} us, the corrected paper law with null space"
+    return row(TICK, mine / theirs, "ratio", 1 / 12, note)
 
 
 def _stack(**options: Any) -> Any:
@@ -220,6 +186,7 @@ def _measured(code: str) -> float:
 Lines = dict[str, Callable[[], Row]]
 GROUPS: dict[str, Lines] = {
     "controller": {TICK: _tick, KINEMATICS: _kinematics},
+    "planner": LINES,
     "step": {STEP: _step, RESET: _reset, PEER_STEP: _peer_step},
     "process": {MEMORY: _memory, IMPORT: _import, START: _start},
 }

@@ -174,18 +174,11 @@ def exceeds_limits(g, q, x):
 
 
 @kernel
-def scale_into_limits(g, q, x):
-    """Scale all speeds together until every joint keeps its bounds: for what rounding has left."""
-    scale = 1.0
+def clip_to_limits(g, q, x):
+    """Every joint within its bounds, exactly: for the last digits that the quadratic program leaves."""
     for i in range(len(q)):
         low, high = allowed_speeds(g, q, i)
-        if x[i] > high:
-            scale = min(scale, high / x[i])
-        if x[i] < low:
-            scale = min(scale, low / x[i])
-    if scale < 1.0:
-        for i in range(len(q)):
-            x[i] *= scale
+        x[i] = min(max(x[i], low), high)
 
 
 @kernel

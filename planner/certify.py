@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .body import FRAME
 from .judge_deviation import deviation_of
 from .judge_sweep import Sweep, Sweeper, SweepSettings
 from .motion_log import PROBLEM, MotionLog, content_of, digest_of
@@ -129,12 +130,16 @@ def certify(
 
 
 def _required(log: MotionLog) -> np.ndarray:
-    """(m, k) distances to keep [m]; -inf for contacts that are allowed."""
+    """(m, k) distances to keep [m]; -inf for contacts that are allowed, and between what both stand still for ever.
+
+    The base cannot run into an obstacle that does not move: where it stands is not a matter of a motion.
+    """
     margins = [log.safety if o.margin is None else o.margin for o in log.obstacles]
     out = np.tile(np.array(margins, dtype=np.float64), (len(log.body), 1))
     for k, mine in enumerate(log.body.names):
         for o, obstacle in enumerate(log.obstacles):
-            if (mine, obstacle.name) in log.allowed:
+            fixed = log.body.rows[k, FRAME] < 0 and not obstacle.velocity.any()
+            if fixed or (mine, obstacle.name) in log.allowed:
                 out[k, o] = -math.inf
     return out
 

@@ -48,6 +48,8 @@ from .robot_work import (
 KIND, FIRST, OTHER, GAP, KEEP, NORMAL, T, S = 0, 1, 2, 3, 4, 5, 8, 9
 SELF_MARGIN = 10
 """Column of SETTINGS: distance [m] to keep between capsules of the robot."""
+HAIR = 1e-4
+"""What a pair that is closer than it should be may come closer still [m], so that it can get away at all."""
 REFINEMENTS = 5
 """A step is looked at in up to 2^5 parts before it is held not to be clear."""
 
@@ -231,7 +233,8 @@ def _pair_stays_clear(g, row, keep, turning, start, dt):
 
     Either the two distances are larger than the way in between (Lipschitz), or a plane that separates the pair at
     one end does so at the other too, less what the path of a capsule's end bends away from its chord:
-    an eighth of its second derivative, which is at most |step|_1 times the way. Not in the paper.
+    an eighth of its second derivative, which is at most twice the turning, of all joints together, times the way.
+    Not in the paper.
     """
     i, j = int(g[row, FIRST]), int(g[row, OTHER])
     way, other = g[WORLD + i, W_REACH], 0.0
@@ -246,7 +249,7 @@ def _pair_stays_clear(g, row, keep, turning, start, dt):
         return False
     if gap + gap_end - way - other >= 2.0 * keep:
         return True
-    bend = 0.125 * turning * way
+    bend = 0.25 * turning * way
     forth = _farthest_against(g, NEXT, i, normal) - _farthest_against(g, WORLD, i, normal)
     if min(gap, gap + forth - _other_way(g, row, WORLD, NEXT, normal, dt)) - bend >= keep:
         return True
@@ -261,13 +264,13 @@ def _part_is_clear(g, q, step, start, dt):
     bound_motion(g, WORLD, step)
     turning = 0.0
     for i in range(len(q)):
-        turning += abs(step[i])
+        turning += abs(step[i]) if g[SLIDING, i] == 0.0 else 0.0
         g[AFTER, i] = q[i] + step[i]
     place_capsules(g, g[AFTER, : len(q)], NEXT)
     first = int(g[HEADER, NEAR])
     for row in range(first, first + int(g[HEADER, N_NEAR])):
         # a pair that is already closer than wanted may not come closer than a hair
-        keep = min(g[row, KEEP], g[row, GAP] - 1e-4)
+        keep = g[row, KEEP] if g[row, GAP] >= g[row, KEEP] else g[row, GAP] - HAIR
         if not _pair_stays_clear(g, row, keep, turning, start, dt):
             return False
     return True
@@ -325,6 +328,7 @@ def _ends_are_clear(g, dt):
     """False if a near pair is too close at the end of the step: no refinement can help. Capsules at NEXT."""
     first = int(g[HEADER, NEAR])
     for row in range(first, first + int(g[HEADER, N_NEAR])):
-        if _look(g, row, NEXT, dt)[0] < min(g[row, KEEP], g[row, GAP] - 1e-4):
+        keep = g[row, KEEP] if g[row, GAP] >= g[row, KEEP] else g[row, GAP] - HAIR
+        if _look(g, row, NEXT, dt)[0] < keep:
             return False
     return True

@@ -36,6 +36,7 @@ from .robot_work import (
     OBSTACLES,
     W_REACH,
     WORLD,
+    among,
     end_a,
     end_b,
     lay_capsules,
@@ -43,7 +44,7 @@ from .robot_work import (
     place_frames,
     robot_work,
 )
-from .shapes import Packed
+from .shapes import Packed, pack
 
 SMALLEST = 1e-4
 """Way [m] below which a stretch that cannot be proven is held to be blocked."""
@@ -58,10 +59,10 @@ def tool_work(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = ()
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
         margin: distance [m] to keep from obstacles without one of their own.
     """
-    work = robot_work((), (), packed, masks=masks, margin=margin, most_near=len(capsules) * len(packed.rows))
+    work = robot_work((), (), pack(()))
     work[HEADER, N_CAPSULES] = len(capsules)
     lay_capsules(work[BODY : BODY + len(capsules)], capsules)
-    return work
+    return among(work, packed, masks, margin)
 
 
 @inlined

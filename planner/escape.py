@@ -31,6 +31,8 @@ from .jit import inner, kernel
 
 FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG = 0, 1, 2, 3, 4, 5
 """The path was clear; detours were found; why not."""
+LEAST_ROOM = 0.005
+"""Room [m] that a root and the way back have at least, where an obstacle's own margin fills the shell."""
 
 
 @kernel
@@ -38,7 +40,7 @@ def first_blocked(g, path, count, first, options):
     """Index of the pose before the first edge that is not clear, from `first` on; -1 if all are."""
     for k in range(first, count - 1):
         x, y = screw.load8(path, k), screw.load8(path, k + 1)
-        if options[ON_SHELL] == 1.0 and tool_room(g, y, 1.0) < options[SHELL] - options[WIDEST]:
+        if options[ON_SHELL] == 1.0 and tool_room(g, y, 1.0) < max(options[SHELL] - options[WIDEST], LEAST_ROOM):
             return k
         if not is_clear(g, x, y, options[WIDEST]):
             return k
@@ -123,13 +125,13 @@ def _shortened(g, poses, count, options):
 def write_edge(out, count, x, y, spacing):
     """Append poses from x (excluded) to y (included) at most `spacing` apart; the new number, -1 if out is full."""
     distance, angle = screw.gap(x, y)
-    steps = max(1, math.ceil(math.hypot(distance, 0.2 * angle) / spacing))
+    steps = max(1, math.ceil(math.hypot(distance, 0.2 * angle) / spacing - 1e-9))
     if count + steps > len(out):
         return -1
     same = x[0] == y[0] and x[1] == y[1] and x[2] == y[2] and x[3] == y[3]
     for k in range(1, steps + 1):
         z = y if k == steps else screw.sclerp(x, y, k / steps)
-        if same:
+        if same and k < steps:
             z = screw.from_pose(screw.translation(z), (x[0], x[1], x[2], x[3]))
         screw.store8(out, count, z)
         count += 1
@@ -200,7 +202,7 @@ def escape(g, path, count, out, rooms, places, poses, branch, tree, cells, heap,
         return START_IN_COLLISION, count, 0
     if tool_room(g, screw.load8(path, count - 1), 1.0) < 0.0:
         return GOAL_IN_COLLISION, count, 0
-    certain, enough = 0, options[SHELL] - options[WIDEST]
+    certain, enough = 0, max(options[SHELL] - options[WIDEST], LEAST_ROOM)
     for detour in range(int(options[ROUNDS])):
         blocked = first_blocked(g, path, count, certain, options)
         if blocked < 0:

@@ -67,11 +67,12 @@ def _shifted(x, delta):
 
 
 @inlined
-def _attitude_key(x):
-    """A number for the orientation of a pose, the same for nearly the same ones."""
-    sign = 1.0 if x[0] >= 0.0 else -1.0
+def _attitude_key(tree, x):
+    """A number for the orientation of a pose as seen from the root, the same for nearly the same ones."""
+    r = screw.qmul((tree[0, 0], -tree[0, 1], -tree[0, 2], -tree[0, 3]), (x[0], x[1], x[2], x[3]))
+    sign = 1.0 if r[0] >= 0.0 else -1.0
     key = 17
-    for value in (sign * x[1], sign * x[2], sign * x[3]):
+    for value in (sign * r[1], sign * r[2], sign * r[3]):
         key = key * 31 + math.floor(5.0 * value + 0.5) + 8
     return key
 
@@ -79,7 +80,8 @@ def _attitude_key(x):
 @inlined
 def _visited(p, attitude, size, cells):
     """True if a kept pose lies in the same cell as the position p with its attitude; else the cell is marked."""
-    x, y, z = math.floor(p[0] / size), math.floor(p[1] / size), math.floor(p[2] / size)
+    # the middle of a cell at the root: whole steps from it lie inside cells, not on their edges
+    x, y, z = math.floor(p[0] / size + 0.5), math.floor(p[1] / size + 0.5), math.floor(p[2] / size + 0.5)
     number = ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791) ^ (attitude * 2654435761)) & 0x7FFFFFFF
     slot, key = number % len(cells), float(number)
     for _ in range(len(cells)):
@@ -141,6 +143,14 @@ def _turned(x, axis, angle):
 
 
 @inlined
+def _from_root(tree, p):
+    """A world point seen from the root, so that the cells turn with the problem."""
+    x = screw.load8(tree, 0)
+    q = screw.translation(x)
+    return screw.rotate((x[0], -x[1], -x[2], -x[3]), (p[0] - q[0], p[1] - q[1], p[2] - q[2]))
+
+
+@inlined
 def _judge(g, tree, row, count, y, p, clear, way, home, goal, cells, options, step, attitude):
     """Append a child at pose y, position p, with the verdict on it."""
     verdict = KEPT
@@ -148,7 +158,7 @@ def _judge(g, tree, row, count, y, p, clear, way, home, goal, cells, options, st
         verdict = OUTSIDE
     elif not clear:
         verdict = REJECTED_EDGE
-    elif _visited(p, attitude, options[CELL] * step, cells):
+    elif _visited(_from_root(tree, p), attitude, options[CELL] * step, cells):
         verdict = VISITED
     length = tree[row, LENGTH] + way
     cost = home + (0.0 if options[GOAL_COST] == 1.0 else length)
@@ -161,7 +171,7 @@ def _judge(g, tree, row, count, y, p, clear, way, home, goal, cells, options, st
 def _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state):
     """Children that keep their parent's orientation, and so all that hangs on it; the new number of rows."""
     normal, u, v = plane
-    p, q, attitude = screw.translation(x), screw.translation(goal), _attitude_key(x)
+    p, q, attitude = screw.translation(x), screw.translation(goal), _attitude_key(tree, x)
     turn, r = 0.2 * screw.gap(x, goal)[1], (x[0], x[1], x[2], x[3])
     for k in range(SIDES + int(options[RANDOM])):
         if count >= len(tree):
@@ -200,7 +210,7 @@ def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state
         home, left = screw.gap(y, goal)
         clear = edge_is_clear(g, x, y)
         _judge(g, tree, row, count, y, screw.translation(y), clear, math.hypot(way, 0.2 * angle),
-               math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(y))  # fmt: skip
+               math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(tree, y))  # fmt: skip
         count += 1
     return count
 
@@ -293,7 +303,7 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
     x = (root[0], root[1], root[2], root[3], root[4], root[5], root[6], root[7])
     home, turn = screw.gap(x, goal)
     _add_node(tree, 0, x, -1, KEPT, 0.0, math.hypot(home, 0.2 * turn))
-    _visited(screw.translation(x), _attitude_key(x), options[CELL] * step, cells)
+    _visited((0.0, 0.0, 0.0), _attitude_key(tree, x), options[CELL] * step, cells)
     count, size = 1, _push(heap, 0, tree[0, SCORE], 0)
     while size > 0 and count < min(len(tree), int(options[MOST])):
         row = _pop(heap, size)

@@ -87,11 +87,11 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _compiled(function, {"forceinline": True})
 
 
-def _compiled(function: Callable[..., Any], options: dict[str, bool]) -> Any:
+def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))
     try:
-        compiler: Any = numba.njit(cache=True, error_model="numpy", nogil=True, **options)
-        return compiler(function)
+        compiler: Any = numba.njit
+        return compiler(cache=True, error_model="numpy", nogil=True, **options)(function)
     finally:
         config.CACHE_DIR = before

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 
 from .arm import Arm
 from .body import Body
+from .chain import FRAME, forward_into
 from .errors import BadOption
-from .escape import ESCAPED, FREE
+from .escape import ESCAPED, FREE, GOAL_IN_COLLISION, START_IN_COLLISION
 from .joint_leg import JointSearchSettings, joint_leg
 from .leg import CHANGED, DETOURS, FOLLOWED, FULL, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
 from .motions import MotionSettings
@@ -28,11 +29,18 @@ from .pose import Pose, PosePath
 from .pursuit import ARRIVED
 from .repet import REASONS, Corner, EscapeTree, RepetSettings
 from .safety import SafetySettings
-from .scene_work import SceneWork, checked_obstacles
+from .scene_work import Layout, SceneWork, checked_obstacles
 from .shapes import Obstacle
 from .workspace import bound
 
 BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0))
+
+WHY = {
+    **REASONS,
+    START_IN_COLLISION: "no room for a detour at the start",
+    GOAL_IN_COLLISION: "no room for a detour at the goal",
+}
+"""Of an escape that was not found: start and goal have been seen to be clear before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +90,9 @@ class Plan(NamedTuple):
         dt: seconds between them.
         reason: "" if the plan arrives and every step of it is proven clear; else why there is none.
         how: "direct", "escape" or "joint search".
-        imitated: the demonstration moved to the goal.
-        path: what was followed: the imitated path behind the guiding pose, or a detour.
-        tree: the last escape tree, None if none was grown.
+        imitated_poses: (n, 8) of the demonstration moved to the goal.
+        path_poses: (m, 8) of what was followed: the imitated path behind the guiding pose, or a detour.
+        tree_rows: of the last escape tree; none if none was grown.
         detours: number of them.
         margin: smallest joint margin on the way [rad].
         changed: ticks in which the safety layer changed the command.
@@ -96,9 +104,9 @@ class Plan(NamedTuple):
     dt: float
     reason: str
     how: str
-    imitated: PosePath
-    path: PosePath
-    tree: EscapeTree | None
+    imitated_poses: np.ndarray
+    path_poses: np.ndarray
+    tree_rows: np.ndarray
     detours: int
     margin: float
     changed: int
@@ -109,6 +117,21 @@ class Plan(NamedTuple):
     def success(self) -> bool:
         """The plan arrives, and every step of it is proven clear."""
         return not self.reason
+
+    @property
+    def imitated(self) -> PosePath:
+        """The demonstration moved to the goal."""
+        return PosePath(self.imitated_poses)
+
+    @property
+    def path(self) -> PosePath:
+        """What was followed: the imitated path behind the guiding pose, or a detour."""
+        return PosePath(self.path_poses)
+
+    @property
+    def tree(self) -> EscapeTree | None:
+        """The last escape tree, None if none was grown."""
+        return EscapeTree.from_rows(self.tree_rows) if len(self.tree_rows) else None
 
 
 class Problem(NamedTuple):
@@ -131,11 +154,17 @@ class Planner:
     """
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings | None = None):
-        self.arm, self.body, self.settings = arm, body, settings or PlanSettings()
+        self.arm, self.settings = arm, settings or PlanSettings()
+        self.hold(body)
         motion = self.settings.motion
         self._work = bound(arm, motion.controller.packed(), motion.pursuit.packed())
         self._buffers: Buffers = buffers(self.settings.repet, arm.dof, round(self.settings.max_seconds / motion.dt))
         self._memory, self._wish, self._out = np.zeros(4), np.empty(arm.dof), np.empty(arm.dof)
+
+    def hold(self, body: Body) -> None:
+        """The body from now on: after something was grasped or released."""
+        self.body = body
+        self._layout = Layout(self.arm, body, self.settings.safety, self.settings.motion.dt)
 
     def plan(
         self,
@@ -163,19 +192,20 @@ class Planner:
         """
         begun = time.perf_counter()
         q = self.arm.checked(start)
-        scene = SceneWork.of(self.arm, self.body, checked_obstacles(obstacles), self.settings, allowed)
+        scene = SceneWork(self._layout, checked_obstacles(obstacles), self.settings.repet.distance, allowed)
         reason = self._unfit(scene, q, goal)
         if reason:
             return self._failed(reason, q, demonstrated, begun)
-        lead = (leaving.dqs if leaving is not None else self.arm.fk(q).dq[None]).copy()
+        lead = leaving.dqs.copy() if leaving is not None else self._pose(q)[None]
         best, escapes = "", []
         for fraction, bias, factor in self._attempts(escapes):
             status, pursuit, margin = self._leg(scene, demonstrated, goal, lead, q, fraction, bias, factor, seed)
             escapes.append(status)
-            if pursuit == ARRIVED and status in (FREE, ESCAPED):
+            if pursuit == ARRIVED:
+                # also where the tool is too close for a detour: the safety layer has proven every step
                 how = "escape" if status == ESCAPED else "direct"
                 return self._plan(how, margin, len(escapes), begun)
-            best = best or REASONS.get(status, "") or "ik_or_limit"
+            best = best or WHY.get(status, "") or "ik_or_limit"
         found = None
         if self.settings.search is not None and self.settings.avoid:
             found = joint_leg(self.arm, scene, self._work, demonstrated, goal, q, self.settings, onward, seed)
@@ -183,7 +213,12 @@ class Planner:
             return self._failed(best, q, demonstrated, begun, len(escapes))
         self._buffers.counts[DETOURS] = self._buffers.counts[TREE_ROWS] = 0
         plan = self._plan("joint search", found.margin, len(escapes), begun)
-        return plan._replace(joints=found.joints, path=found.path)
+        return plan._replace(joints=found.joints, path_poses=found.path.dqs)
+
+    def _pose(self, q: np.ndarray) -> np.ndarray:
+        out = np.empty(8)
+        forward_into(self.arm.chain, q, np.empty((self.arm.dof, FRAME)), out)
+        return out
 
     def _unfit(self, scene: SceneWork, q: np.ndarray, goal: Pose) -> str:
         if self.arm.margin(q) < 0.0:
@@ -234,9 +269,9 @@ class Planner:
             self.settings.motion.dt,
             "",
             how,
-            PosePath(b.imitated[: counts[IMITATED]]),
-            PosePath(b.followed[: counts[FOLLOWED]]),
-            EscapeTree.from_rows(b.tree[:rows]) if rows else None,
+            b.imitated[: counts[IMITATED]].copy(),
+            b.followed[: counts[FOLLOWED]].copy(),
+            b.tree[:rows].copy(),
             int(counts[DETOURS]),
             float(margin),
             int(counts[CHANGED]),
@@ -245,12 +280,11 @@ class Planner:
         )
 
     def _failed(self, reason: str, q: np.ndarray, demonstrated: PosePath, begun: float, tries: int = 0) -> Plan:
-        b, rows = self._buffers, int(self._buffers.counts[TREE_ROWS]) if tries else 0
-        tree = EscapeTree.from_rows(b.tree[:rows]) if rows else None
-        count = int(b.counts[FULL]) if tries else 0
-        path = PosePath(b.path[:count]) if count else demonstrated
+        b, counts = self._buffers, self._buffers.counts if tries else np.zeros(8, dtype=np.int64)
+        path = b.path[: counts[FULL]].copy() if counts[FULL] else demonstrated.dqs
         seconds, dt = time.perf_counter() - begun, self.settings.motion.dt
-        return Plan(q[None], dt, reason, "", demonstrated, path, tree, 0, -np.inf, 0, tries, seconds)
+        tree = b.tree[: counts[TREE_ROWS]].copy()
+        return Plan(q[None], dt, reason, "", demonstrated.dqs, path, tree, 0, -np.inf, 0, tries, seconds)
 
 
 def plan(

@@ -26,7 +26,7 @@ from .pose import METERS_PER_RADIAN, PosePath
 from .pursuit import ARRIVED, INDEX, WAITED
 from .safety import BLOCKED as UNSAFE
 from .safety import safe_velocity
-from .scene_work import SceneWork
+from .scene_work import Layout, SceneWork
 from .shapes import Obstacle
 from .workspace import PURSUIT, bound
 
@@ -107,7 +107,8 @@ class ReactivePlanner:
     def hold(self, body: Body) -> None:
         """The body from now on: after something was grasped or released."""
         self.body = body
-        self._planner.body = body
+        self._planner.hold(body)
+        self._layout = Layout(self.arm, body, self.settings.plan.safety, self.settings.plan.motion.dt)
         self._bind()
 
     def see(self, obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]] = ()) -> None:
@@ -259,9 +260,8 @@ class ReactivePlanner:
 
     def _bind(self) -> None:
         self._moving = any(_moves(o) for o in self._obstacles)
-        self._scene = SceneWork.of(
-            self.arm, self.body, self._ahead(), self.settings.plan, self._known_allowed(self._obstacles)
-        )
+        distance = self.settings.plan.repet.distance
+        self._scene = SceneWork(self._layout, self._ahead(), distance, self._known_allowed(self._obstacles))
 
     def _known_allowed(self, obstacles: Sequence[Obstacle]) -> list[tuple[str, str]]:
         """The wanted contacts of what is there now."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -90,7 +90,7 @@ class RepetSettings:
     square: bool = False
     cost: str = "length"
     orientation: str = "root"
-    turn: float = 0.4
+    turn: float = 0.8
     retries: int = 4
     grow: float = 1.5
     shrink: float = 0.4
@@ -133,6 +133,11 @@ class RepetSettings:
         for name in ("retries", "random"):
             if not 0 <= getattr(self, name) <= 1000:
                 raise BadOption(name, f"{getattr(self, name)} is not from 0 to 1000")
+        numbers = np.array([*self.bias, *self.workspace[0], *self.workspace[1]], dtype=np.float64)
+        if not np.isfinite(numbers).all():
+            raise BadOption("bias", f"or workspace: {self.bias}, {self.workspace} hold a number that is not finite")
+        if (np.array(self.workspace[0]) >= np.array(self.workspace[1])).any():
+            raise BadOption("workspace", f"the lowest corner {self.workspace[0]} is not below {self.workspace[1]}")
         if self.shell <= self.distance:
             raise BadOption("shell", f"{self.shell} is not above the distance to keep, {self.distance}")
 
@@ -278,4 +283,5 @@ def clear_of(pose: Pose, tool: np.ndarray, obstacles: Sequence[Obstacle]) -> flo
     """Smallest distance [m] of the tool at a pose from obstacles; 1 if they are farther."""
     from .edges import tool_room
 
-    return float(tool_room(tool_work(tool, pack(obstacles)), tuple(float(v) for v in pose.dq), 1.0))
+    bare = [replace(obstacle, margin=None) for obstacle in obstacles]
+    return float(tool_room(tool_work(tool, pack(bare)), tuple(float(v) for v in pose.dq), 1.0))

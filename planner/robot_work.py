@@ -65,7 +65,6 @@ def robot_work(
     margin: float = 0.0,
     pairs: Sequence[tuple[int, int]] = (),
     settings: Sequence[float] = (),
-    most_near: int = 0,
 ) -> np.ndarray:
     """The array of a robot among obstacles.
 
@@ -77,7 +76,6 @@ def robot_work(
         margin: safety distance [m] to keep from obstacles without one of their own.
         pairs: capsules that may hit each other, counted through all bodies.
         settings: numbers of the row SETTINGS.
-        most_near: capacity for near pairs; 0: as many as there can be.
     """
     count, joints = sum(len(body) for body in bodies), sum(arm.dof for arm in arms)
     if len(arms) > MAX_ARMS or count > MAX_CAPSULES or joints > MAX_JOINTS:
@@ -86,24 +84,37 @@ def robot_work(
             f"allowed are {MAX_ARMS}, {MAX_CAPSULES} and {MAX_JOINTS}"
         )
         raise BadOption("robot", reason)
-    k, p = len(packed.rows), len(pairs)
-    near = most_near or count * k + p
+    work = np.zeros((OBSTACLES + len(pairs), WIDTH))
+    work[HEADER, :5] = len(arms), joints, count, 0, len(pairs)
+    work[HEADER, PAIRS] = OBSTACLES
+    work[SETTINGS, : len(settings)] = settings
+    if len(pairs):
+        work[OBSTACLES:, :2] = pairs
+    _lay_arms(work, arms, bodies)
+    return among(work, packed, masks, margin)
+
+
+def among(robot: np.ndarray, packed: Packed, masks: Sequence[int], margin: float) -> np.ndarray:
+    """The array of a robot, moved among other obstacles; see `robot_work`."""
+    joints, capsules, pairs = (int(robot[HEADER, column]) for column in (N_JOINTS, N_CAPSULES, N_PAIRS))
+    k, old = len(packed.rows), int(robot[HEADER, PAIRS])
+    near = capsules * k + pairs
     first_pair = OBSTACLES + k
-    first_near = first_pair + p
+    first_near = first_pair + pairs
     first_bound = first_near + near
     first_vertex = first_bound + near + 2 * joints
     work = np.zeros((first_vertex + len(packed.vertices), WIDTH))
-    work[HEADER, :10] = len(arms), joints, count, k, p, 0, first_pair, first_near, first_bound, first_vertex
-    work[SETTINGS, : len(settings)] = settings
-    _lay_arms(work, arms, bodies)
-    work[SEEN, SEEN_MOVING] = float(np.any(packed.rows[:, 17:20]))
-    work[OBSTACLES:first_pair, :ROW] = packed.rows
+    work[:OBSTACLES] = robot[:OBSTACLES]
+    work[HEADER, N_OBSTACLES : N_NEAR + 1] = k, pairs, 0
+    work[HEADER, PAIRS : VERTICES + 1] = first_pair, first_near, first_bound, first_vertex
+    work[SEEN, SEEN_COUNTS], work[SEEN, SEEN_MOVING] = 0.0, float(packed.rows[:, 17:20].any())
+    rows = work[OBSTACLES:first_pair]
+    rows[:, :ROW] = packed.rows
     # vertices lie in the same array: meshes know their rows in it
-    work[OBSTACLES:first_pair, 21] += first_vertex
-    work[OBSTACLES:first_pair, MASK] = masks if len(masks) else 0
-    work[OBSTACLES:first_pair, MARGIN] = np.where(packed.rows[:, 23] < 0, margin, packed.rows[:, 23])
-    if p:
-        work[first_pair:first_near, :2] = pairs
+    rows[:, 21] += first_vertex
+    rows[:, MASK] = masks if len(masks) else 0
+    rows[:, MARGIN] = np.where(packed.rows[:, 23] < 0, margin, packed.rows[:, 23])
+    work[first_pair:first_near] = robot[old : old + pairs]
     work[first_vertex:, :3] = packed.vertices
     return work
 

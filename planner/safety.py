@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arm import Arm
-from .barrier import DECAY, HALVINGS, SHELL, constrain, exceeds_limits, scale_into_limits, scale_to_speeds
+from .barrier import DECAY, HALVINGS, SHELL, clip_to_limits, constrain, exceeds_limits, scale_to_speeds
 from .body import Body
 from .clearance import find_near, least_room, reach_of, room_of_near, step_stays_clear
 from .errors import BadOption, BadShape, UnknownName
@@ -95,7 +95,8 @@ class SafetySettings:
 
     def packed(self, dt: float) -> tuple[float, ...]:
         """The settings as the kernels take them, for commands that are held for dt seconds."""
-        rates = (self.shell, self.alpha, self.buffer, self.limit_gain, self.rotation_weight, self.rest_weight)
+        limit_gain = min(self.limit_gain, 1.0 / dt)  # no farther than to the limit in one step
+        rates = (self.shell, self.alpha, self.buffer, limit_gain, self.rotation_weight, self.rest_weight)
         return (*rates, self.decay, float(self.halvings), self.acceleration * dt, 0.0, self.self_distance)
 
 
@@ -181,7 +182,7 @@ def safe_velocity(g, q, qdot, dt, out):
         _look(g, q)
     if int(g[HEADER, N_NEAR]) > 0 or exceeds_limits(g, q, out):
         missed = constrain(g, q, out)
-    scale_into_limits(g, q, out)
+    clip_to_limits(g, q, out)
     status = FREE
     for i in range(n):
         if out[i] != qdot[i]:

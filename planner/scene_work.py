@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from .edges import tool_room, tool_work
 from .errors import BadOption
 from .pose import Pose
 from .repet import MAX_OBSTACLES
-from .robot_work import MARGIN, OBSTACLES, SEEN, SEEN_COUNTS, SEEN_MOVING, robot_work
+from .robot_work import MARGIN, OBSTACLES, SEEN, SEEN_COUNTS, SEEN_MOVING, among, robot_work
 from .safety import SafetySettings, contact_masks
 from .shapes import Obstacle, pack
 
@@ -34,30 +33,42 @@ PLACE = slice(2, 20)
 """Columns of an obstacle that change when it moves."""
 
 
+class Layout:
+    """What of the work arrays belongs to the arm and its body: made once, copied for every scene."""
+
+    def __init__(self, arm: Arm, body: Body, safety: SafetySettings, dt: float):
+        nothing = pack(())
+        self.names, self.safety = body.names, safety
+        self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
+        self.robot = robot_work((arm,), (body,), nothing, settings=safety.packed(dt))
+        self.tool = tool_work(body.tool(arm), nothing)
+
+
 class SceneWork:
-    """The work arrays of an arm among obstacles: `robot` for the whole arm, `tool(factor)` for the tool."""
+    """The work arrays of an arm among obstacles: `robot` for the whole arm, `tool(factor)` for the tool.
+
+    Args:
+        layout: of the arm and its body.
+        obstacles: as they are now.
+        distance: for planning, to keep between tool and obstacles without a margin of their own [m].
+        allowed: pairs of names (part of the body or held object, obstacle) that may touch.
+    """
 
     def __init__(
         self,
-        arm: Arm,
-        body: Body,
+        layout: Layout,
         obstacles: Sequence[Obstacle],
-        safety: SafetySettings,
         distance: float,
-        dt: float,
         allowed: Sequence[tuple[str, str]] = (),
     ):
-        packed = pack(obstacles)
-        masks = contact_masks(body.names, obstacles, allowed)
-        self.robot = robot_work(
-            (arm,), (body,), packed, masks=masks, margin=safety.distance, settings=safety.packed(dt), most_near=0
-        )
-        at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
-        tool_masks = [sum(1 << k for k, row in enumerate(at_tool) if mask >> int(row) & 1) for mask in masks]
-        self._tool = tool_work(body.tool(arm), packed, masks=tool_masks, margin=distance)
+        packed, self._distance = pack(obstacles), distance
+        masks = contact_masks(layout.names, obstacles, allowed)
+        self.robot = among(layout.robot, packed, masks, layout.safety.distance)
+        tool_masks = [sum(1 << k for k, row in enumerate(layout.at_tool) if mask >> int(row) & 1) for mask in masks]
+        self._tool = among(layout.tool, packed, tool_masks, distance)
         self._margins = self._tool[OBSTACLES : OBSTACLES + len(obstacles), MARGIN]
-        self._own = np.array([obstacle.margin is not None for obstacle in obstacles], dtype=bool)
-        self._distance = distance
+        self._own = packed.rows[:, 23] >= 0.0
+        self.robot_distance = layout.safety.distance
 
     @staticmethod
     def of(
@@ -67,9 +78,9 @@ class SceneWork:
         settings: PlanSettings,
         allowed: Sequence[tuple[str, str]] = (),
     ) -> SceneWork:
-        """The arrays for the distances of these settings."""
-        distance, dt = settings.repet.distance, settings.motion.dt
-        return SceneWork(arm, body, obstacles, settings.safety, distance, dt, allowed)
+        """The arrays for the distances of these settings, laid out anew."""
+        layout = Layout(arm, body, settings.safety, settings.motion.dt)
+        return SceneWork(layout, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
     def move(self, obstacles: Sequence[Obstacle]) -> None:
         """The same obstacles at other places, with other velocities."""
@@ -96,12 +107,3 @@ class SceneWork:
         factor = self.robot_distance / self._distance if self._distance > 0 else 1.0
         work = self.tool(factor)
         return float(tool_room(work, tuple(float(value) for value in pose.dq), 1.0))
-
-    @property
-    def robot_distance(self) -> float:
-        """Safety distance [m] of the whole arm."""
-        free = np.flatnonzero(~self._own)
-        if not len(free):
-            return self._distance
-        margin = float(self.robot[OBSTACLES + int(free[0]), MARGIN])
-        return margin if math.isfinite(margin) else self._distance

@@ -45,6 +45,9 @@ def plane_basis(normal, towards, world_basis):
         axis = (1.0, 0.0, 0.0) if x <= y and x <= z else ((0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0))
         v = screw.cross(axis, normal)
     v = _unit(v)
+    # nearly head-on the projection has lost digits: once more
+    along = normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2]
+    v = _unit((v[0] - along * normal[0], v[1] - along * normal[1], v[2] - along * normal[2]))
     return screw.cross(v, normal), v
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 from solids import KINDS, fcl_capsule, fcl_distance, fcl_obstacle, random_pose, random_shape, true_distance
-from strategies import directions, for_all, known_defect
+from strategies import directions, for_all
 
 from onedemo.planner.body_models import segment_distance
 from onedemo.planner.gjk import segment_polytope
@@ -368,7 +368,6 @@ def test_the_basis_of_a_plane_is_orthonormal_and_right_handed():
             assert_right_handed(n, towards, world_basis)
 
 
-@known_defect("tangent.plane_basis projects once: nearly head-on, rounding is blown up by 1 / sine")
 def test_nearly_head_on_the_basis_is_as_sharp():
     for n in normals()[::20]:
         side = np.array(plane_basis(tuple(n), tuple(n), 1.0)[0])

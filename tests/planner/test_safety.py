@@ -29,7 +29,7 @@ from soak import (
     run_scene,
 )
 from solids import KINDS, random_pose, random_shape
-from strategies import for_all, known_defect
+from strategies import for_all
 
 from onedemo.planner import jit
 from onedemo.planner.arm import Arm
@@ -236,7 +236,6 @@ def test_whatever_is_asked_nothing_comes_too_close_in_a_hundred_thousand_steps()
         assert tally[ROOMY] > 20_000 and by_fcl < 2e-3
 
 
-@known_defect("clearance._part_is_clear gives way by 1e-4 m within a step, see test_clearance")
 def test_not_even_a_hair_is_given_up_between_the_ends_of_a_step():
     """Scenes that the long run found."""
     for seed in (13,):
@@ -244,7 +243,6 @@ def test_not_even_a_hair_is_given_up_between_the_ends_of_a_step():
         assert tally[TOO_CLOSE] == 0, f"{seed}: {tally[WORST]} m"
 
 
-@known_defect("barrier.scale_into_limits stops all joints where one at its limit is past it by rounding")
 def test_stops_of_any_kind_with_room_around_are_rare():
     tally = total([run_scene(random_scene(seed, "random"), seed, 2000, 1, 1)[0] for seed in range(20)])
     assert tally[STOPPED] <= 0.02 * tally[ROOMY]
@@ -331,7 +329,6 @@ def test_joint_limits_are_never_exceeded(seed, dt):
         assert (q >= arm.lower - 1e-12).all() and (q <= arm.upper + 1e-12).all()
 
 
-@known_defect("barrier.allowed_speeds: with limit_gain * dt > 1 a step goes past the limit; nothing refuses it")
 def test_joint_limits_hold_for_long_steps_too():
     layer = SafetyLayer([gantry(reach=1.0)], [BALL], [], 0.2)
     q = np.zeros(3)
