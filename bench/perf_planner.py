@@ -94,7 +94,8 @@ def _expand_loop(g, tree, cells, options, state, repeats):
 
 def _level(name: str, shape: Shape, goal: float) -> Row:
     """A level of an escape tree: a plane and eight children with proven edges, in a compiled loop."""
-    directions = np.random.default_rng(1).normal(size=(5, 3))
+    rng = np.random.default_rng(1)
+    directions = rng.normal(size=(5, 3))
     places = 0.25 * directions / np.linalg.norm(directions, axis=1)[:, None]
     obstacles = [Obstacle(shape, Pose.from_yaw(place, 0.3)) for place in places]
     g, options = tool_work(point_tool(0.02), pack(obstacles), margin=0.02), RepetSettings().packed()

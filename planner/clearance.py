@@ -308,8 +308,6 @@ def step_stays_clear(g, q, step, dt):
                 break
         if clear:
             return True
-        if level == 0 and not _ends_are_clear(g, dt):
-            return False
     return False
 
 
@@ -321,14 +319,3 @@ def room_of_near(g, world, seconds):
         gap = g[row, GAP] if world < 0 else _look(g, row, world, seconds)[0]
         least = min(least, gap - g[row, KEEP])
     return least
-
-
-@inner
-def _ends_are_clear(g, dt):
-    """False if a near pair is too close at the end of the step: no refinement can help. Capsules at NEXT."""
-    first = int(g[HEADER, NEAR])
-    for row in range(first, first + int(g[HEADER, N_NEAR])):
-        keep = g[row, KEEP] if g[row, GAP] >= g[row, KEEP] else g[row, GAP] - HAIR
-        if _look(g, row, NEXT, dt)[0] < keep:
-            return False
-    return True

@@ -19,6 +19,7 @@ import numpy as np
 from . import screw
 from .clearance import GAP, KEEP, NORMAL, find_near
 from .edges import edge_is_clear, place_tool, screw_is_clear, slide_is_clear, tool_room
+from .heap import pop, push
 from .jit import inlined, inner, kernel
 from .robot_work import HEADER, N_NEAR, NEAR, WORLD
 from .tangent import SIDES, child_direction, plane_basis
@@ -190,14 +191,16 @@ def _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state
 
 @inner
 def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state):
-    """Children that turn on the way home, are pulled back to the shell, or turn where they are."""
+    """Children that turn on the way home, are pulled back to the shell, or turn where they are and go straight on."""
     normal, u, v = plane
     q, moves = screw.translation(goal), SIDES + int(options[RANDOM])
     first = 0 if options[SPREAD] == 1.0 or options[PULL] == 1.0 else moves
-    for k in range(first, moves + (6 if options[TURN] > 0.0 else 0)):
+    for k in range(first, moves + (7 if options[TURN] > 0.0 else 0)):
         if count >= len(tree):
             break
-        if k >= moves:
+        if k == moves + 6:
+            y = _towards(x, q, step)
+        elif k >= moves:
             y = _turned(x, (normal, u, v)[(k - moves) // 2], options[TURN] if k % 2 == 0 else -options[TURN])
         else:
             d = child_direction(k, normal, u, v, options[SQUARE], options[AWAY], state)
@@ -213,6 +216,15 @@ def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state
                math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(tree, y))  # fmt: skip
         count += 1
     return count
+
+
+@inner
+def _towards(x, q, step):
+    """The pose a step straight towards a point: once it is turned, a tool may pass where no plane leads."""
+    p = screw.translation(x)
+    d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
+    part = step / max(math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), step)
+    return _shifted(x, (part * d[0], part * d[1], part * d[2]))
 
 
 @inner
@@ -247,36 +259,6 @@ def expand(g, tree, row, count, goal, cells, options, step, state):
 
 
 @inner
-def _push(heap, size, score, row):
-    """Put a row on the heap, cheapest first; its new size, the same if it is full."""
-    if size == len(heap):
-        return size
-    k = size
-    while k > 0 and heap[(k - 1) // 2, 0] > score:
-        heap[k, 0], heap[k, 1] = heap[(k - 1) // 2, 0], heap[(k - 1) // 2, 1]
-        k = (k - 1) // 2
-    heap[k, 0], heap[k, 1] = score, row
-    return size + 1
-
-
-@inner
-def _pop(heap, size):
-    """The cheapest row; its place is taken by the last, which sinks."""
-    row, size = int(heap[0, 1]), size - 1
-    score, last, k = heap[size, 0], heap[size, 1], 0
-    while 2 * k + 1 < size:
-        child = 2 * k + 1
-        if child + 1 < size and heap[child + 1, 0] < heap[child, 0]:
-            child += 1
-        if heap[child, 0] >= score:
-            break
-        heap[k, 0], heap[k, 1] = heap[child, 0], heap[child, 1]
-        k = child
-    heap[k, 0], heap[k, 1] = score, last
-    return row
-
-
-@inner
 def _seen(g, x, candidates):
     """The first candidate pose with a clear screw from x to it; -1 if there is none."""
     for j in range(len(candidates)):
@@ -304,9 +286,9 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
     home, turn = screw.gap(x, goal)
     _add_node(tree, 0, x, -1, KEPT, 0.0, math.hypot(home, 0.2 * turn))
     _visited((0.0, 0.0, 0.0), _attitude_key(tree, x), options[CELL] * step, cells)
-    count, size = 1, _push(heap, 0, tree[0, SCORE], 0)
+    count, size = 1, push(heap, 0, tree[0, SCORE], 0)
     while size > 0 and count < min(len(tree), int(options[MOST])):
-        row = _pop(heap, size)
+        row = pop(heap, size)
         size -= 1
         level = int(tree[row, LEVEL])
         if used[level] >= options[BEAM]:
@@ -320,7 +302,7 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
             end = expand(g, tree, row, count, goal, cells, options, step, state)
             for k in range(count, end):
                 if tree[k, VERDICT] == KEPT:
-                    size = _push(heap, size, tree[k, SCORE], k)
+                    size = push(heap, size, tree[k, SCORE], k)
             count = end
     return -1, -1, count
 

@@ -53,6 +53,7 @@ PLANNER_ORDER = [
     "safety",
     "guarded",
     "tangent",
+    "heap",
     "edges",
     "escape_tree",
     "escape",
