@@ -164,7 +164,7 @@ def screw_is_clear(g, x, y):
     """True if the tool keeps clear along the screw from pose x to pose y, the shorter way round, ends included."""
     twist = screw.twist_of(screw.mul(screw.conj(x), y))
     fastest = point_speeds(g, twist)
-    for s in (1.0, 0.5):  # what is blocked is mostly seen at once
+    for s in (0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
         if tool_room(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), 0.1) < 0.0:
             return False
     s = 0.0

@@ -96,7 +96,7 @@ class RepetSettings:
     shrink: float = 0.4
     random: int = 8
     away: float = 1.0
-    candidates: int = 8
+    candidates: int = 5
     cell: float = 0.5
     nodes: int = 4000
     rounds: int = 10
