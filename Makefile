@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 FOLDERS := envs planner baselines configs bench tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lint types check perf soak bodies clean
+.PHONY: help demo test slow lint types check perf soak study bodies clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -49,6 +49,12 @@ check: lint types test ## lint, types and tests
 
 perf: $(VENV)/.developed ## the table of speeds
 	@$(BIN)/onedemo perf
+
+soak: $(VENV)/.developed ## try for an hour to break the guard; the result is bench/soak.json
+	@$(BIN)/python tests/soak.py --guard 1000000 --seed 0 --output bench/soak.json
+
+study: $(VENV)/.developed ## plan in a thousand random scenes, judged; the result is bench/scenes.json
+	@$(BIN)/python tests/scene_study.py --count 150 --output bench/scenes.json
 
 bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
 	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"

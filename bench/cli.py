@@ -52,6 +52,27 @@ def run(
 
 
 @app.command()
+def plan(
+    scene: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped scene, like wall_gap.")],
+    overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the scene.")] = None,
+    figure: Annotated[Path | None, typer.Option("--figure", help="Draw it: .png, .pdf or .svg.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the plan as JSON for the judge.")] = None,
+    certify: Annotated[bool, typer.Option(help="Let the independent judge look at the plan.")] = True,
+) -> None:
+    """Plan one motion round obstacles, without a simulator, and draw it.
+
+    Keys of a scene: robot, demonstration, start, goal, obstacles, held, allowed, settings, seed. Shipped scenes:
+    free, sphere, wall_gap, shelf, clutter, cage. The exit code is 1 where no plan was found, which is said with the
+    reason, and 2 for a scene that cannot be used.
+
+    Example: onedemo plan wall_gap --figure gap.png
+    """
+    from .plan_command import run_plan
+
+    raise typer.Exit(run_plan(scene, overrides or [], figure, output, judged=certify))
+
+
+@app.command()
 def perf(
     json: Annotated[Path | None, typer.Option("--json", help="Also write the rows to this file.")] = None,
     only: Annotated[str, typer.Option("--only", help="Part of a line's name, or a shell pattern.")] = "*",

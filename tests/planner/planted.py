@@ -155,7 +155,7 @@ BUGS = [
     ),
     Bug("lever does not grow", "clearance", "_lever(g, joint, b)) + way)", "_lever(g, joint, b)))", WAY),
     Bug("way of sliding joints dropped", "clearance", "way += abs(step[joint])\n", "way += 0.0\n", WAY),
-    Bug("bend dropped", "clearance", "bend = 0.125 * turning * way", "bend = 0.0", STEP),
+    Bug("bend dropped", "clearance", "bend = 0.25 * turning * way", "bend = 0.0", STEP),
     Bug(
         "velocity of the obstacle dropped from the plane",
         "clearance",
