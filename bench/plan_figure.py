@@ -17,7 +17,7 @@ from ..planner.pose import Pose
 from ..planner.segment import resampled
 from ..planner.tsia import final_path, guide_index, imitated_path
 from .plan_command import Planned
-from .plan_solids import arm_patch, floor_corners, paint_arm, paint_floor, paint_shells, paint_solid
+from .plan_solids import arm_patch, floor_corners, paint_arm, paint_floor, paint_shells, paint_solid, scale_ends
 from .plan_tree import KEPT, PLANE, REJECTED, paint_tree
 from .plan_view import Solid, View, back_to_front, ball_along, best_view, hidden_by, solid_of
 
@@ -28,7 +28,7 @@ GROUND = ("table", "floor", "ground")
 """Boxes of these names are drawn as the floor that they are."""
 HIDDEN = 0.34
 """Opacity of lines behind a solid."""
-TRIAD, LABEL = 0.055, 0.035
+TRIAD, LABEL, TOP = 0.055, 0.035, 0.06
 """Lengths [m]."""
 DPI = 144
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -81,7 +81,7 @@ def draw_plan(planned: Planned, certificate: Certificate | None, files: Sequence
     shown = content.executed if len(content.executed) else content.final
     ghosts = [capsule for arm in content.arms for capsule in arm]
     view = best_view(_thinned(shown), _thinned(content.final), content.solids, ghosts)
-    low, high = _window(content, view)
+    low, high = window_of(content, view)
     height = min(max(WIDTH * (high - low)[1] / (high - low)[0], 3.6), 6.6)
     with plt.rc_context({"font.family": "DejaVu Sans", "svg.hashsalt": "onedemo"}):
         figure = plt.figure(figsize=(WIDTH, height + BELOW + ABOVE))
@@ -154,7 +154,7 @@ def _thinned(points: np.ndarray) -> np.ndarray:
     return points[np.unique(np.linspace(0, len(points) - 1, 60).astype(int))]
 
 
-def _room(content: Content) -> tuple[np.ndarray, np.ndarray]:
+def room_of(content: Content) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner (3,) [m] of the box that is drawn: paths and obstacles, down to the floor."""
     solids = [s.core + sign * s.radius for s in content.solids for sign in (-1.0, 1.0)]
     points = np.vstack([content.demonstrated, content.final, content.executed, *solids])
@@ -168,18 +168,18 @@ def _room(content: Content) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def _window(content: Content, view: View) -> tuple[np.ndarray, np.ndarray]:
+def window_of(content: Content, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Corners (2,) [m] of what is seen: paths, frames, obstacles and the hand, with a border."""
-    low, high = _room(content)
+    low, high = room_of(content)
     corners = floor_corners(low - BORDER, high + BORDER)
     labels = 0.5 * (low + high) + (0.5 * (high - low) + 0.16) * SIDES
     labels[:, 2] = content.floor
     shells = [solid.outline(view, 0.05) for solid in content.solids]
     tips = [f.position + TRIAD * f.rotation.T for f in content.frames]
-    paths = [content.demonstrated, content.final, content.executed, *tips, high[None] * [0, 0, 1] + low * [1, 1, 0]]
+    paths = [content.demonstrated, content.final, content.executed, *tips, scale_ends(view, low, high)]
     hands = [solid.outline(view) for arm in content.arms for solid in arm[-6:]]
     points = np.vstack([view.flat(corners), view.flat(np.vstack([*paths, labels])), *shells, *hands])
-    return points.min(axis=0) - 0.01, points.max(axis=0) + 0.03
+    return points.min(axis=0) - 0.01, points.max(axis=0) + TOP
 
 
 def _stretched(low: np.ndarray, high: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
@@ -190,7 +190,7 @@ def _stretched(low: np.ndarray, high: np.ndarray, ratio: float) -> tuple[np.ndar
 
 
 def _paint(axes: Any, planned: Planned, content: Content, view: View) -> None:
-    paint_floor(axes, view, *_room(content))
+    paint_floor(axes, view, *room_of(content))
     for posture, arm in enumerate(content.arms):
         paint_arm(axes, view, arm, posture)
     shelled = [solid for solid, wanted in zip(content.solids, content.shelled, strict=True) if wanted]

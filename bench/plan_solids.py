@@ -118,10 +118,15 @@ def floor_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     )
 
 
-def _height_scale(axes: Any, view: View, low: np.ndarray, high: np.ndarray) -> None:
-    """At the corner of the floor that is leftmost in the picture."""
+def scale_ends(view: View, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(2, 3) foot and head of the scale of heights: at the corner of the floor that is leftmost in the picture."""
     corners = floor_corners(low, high)
     foot = corners[int(view.flat(corners)[:, 0].argmin())]
+    return np.array([foot, [foot[0], foot[1], high[2]]])
+
+
+def _height_scale(axes: Any, view: View, low: np.ndarray, high: np.ndarray) -> None:
+    foot = scale_ends(view, low, high)[0]
     up = np.array([0.0, 0.0, 1.0])
     ticks = _ticks(low[2], high[2])
     axes.plot(*view.flat(np.stack([foot, foot + (high[2] - low[2]) * up])).T, color="0.75", linewidth=0.9, zorder=2)

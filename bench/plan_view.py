@@ -215,7 +215,7 @@ def best_view(shown: np.ndarray, aside: np.ndarray, solids: Sequence[Solid], gho
             spread = np.ptp(a, axis=0).max()
             hidden = np.mean([solid.hides(shown, view) for solid in solids], axis=1).sum() if solids else 0.0
             veiled = np.mean([solid.hides(things, view) for solid in ghosts]) if ghosts else 0.0
-            value = 2.5 * apart + 0.35 * spread - 0.22 * hidden - 0.9 * veiled - 0.0004 * abs(elevation - 26)
+            value = 2.5 * apart + 0.35 * spread - 0.22 * hidden - 2.0 * veiled - 0.0004 * abs(elevation - 26)
             if value > most:
                 best, most = view, value
     return best

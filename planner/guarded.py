@@ -75,4 +75,3 @@ def guarded_roll_out(work, g, path, q, dt, memory, wish, out, trace, first):
             # what stands still cannot hit an arm that does
             q[i] += dt * out[i] if safety != BLOCKED else 0.0
     return STALLED, len(trace) - 1, margin, changed
-

@@ -11,6 +11,7 @@ from arms import panda_urdf
 
 from onedemo.bench import plan_command
 from onedemo.bench.plan_command import NOT_FOUND, REFUSED, plan_in, run_plan, scene_path
+from onedemo.bench.plan_solids import scale_ends
 from onedemo.bench.plan_view import View, back_to_front, best_view, hull, solid_of, union
 from onedemo.configs.scene import load_scene, shipped_scene
 from onedemo.planner.certify import certify
@@ -105,6 +106,21 @@ def test_figures_show_what_the_legend_says(name, tmp_path):
     assert (seen["free"] > 1000) == (name != "cage")
     corners = image[[0, 0, -1, -1], [0, -1, 0, -1], :3]
     assert (corners == 1.0).all()
+
+
+@pytest.mark.parametrize("name", [*FOUND, "cage"])
+def test_nothing_that_matters_is_cut_off(name):
+    from onedemo.bench.plan_figure import content_of, room_of, window_of
+
+    content = content_of(planned(name))
+    for azimuth in (-155, -35, 55, 145):
+        view = View(float(azimuth), 26.0)
+        low, high = window_of(content, view)
+        scale = view.flat(scale_ends(view, *room_of(content)))
+        for points in (scale, view.flat(content.executed), *[solid.outline(view) for solid in content.solids]):
+            assert ((points > low) & (points < high)).all()
+        # room for "z [m]" above the scale
+        assert scale[1, 1] < high[1] - 0.05
 
 
 def test_a_figure_in_pdf_is_small_and_has_no_pixels(tmp_path):

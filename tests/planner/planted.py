@@ -220,7 +220,13 @@ BUGS = [
         "if g[SLIDING, joint] >= 0.0:\n            u, v, w = p[0] - g[f, 3]",
         ROWS,
     ),
-    Bug("limits swapped", "barrier", "low if sign > 0.0 else -high", "low if sign < 0.0 else -high", LIMITS),
+    Bug(
+        "limits swapped",
+        "barrier",
+        "low if sign > 0.0 else -high",
+        "low if sign < 0.0 else -high",
+        ("clearance", "last_bounds"),
+    ),
     Bug(
         "approach to limits unbounded",
         "barrier",

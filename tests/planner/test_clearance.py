@@ -193,6 +193,25 @@ def test_bounds_are_the_derivatives_of_the_distances(seed):
         assert bound[32] == pytest.approx(closing - SETTING.alpha * room, abs=2e-4)
 
 
+def test_the_last_bounds_are_the_speeds_that_each_joint_may_have():
+    """Down to its lowest, up to its highest, near its limits at both ends too."""
+    arm = gantry(reach=1.0)
+    g = work_of(arm, POINT, [])
+    for q in ([0.0, 0.0, 0.0], [1.0, -1.0, 0.99], [-0.999, 0.9, 1.0]):
+        q = np.array(q)
+        place_capsules(g, q, WORLD)
+        find_near(g, 0.5)
+        assert lay_bounds(g, q) == 6
+        first = int(g[HEADER, BOUNDS])
+        rows = g[first : first + 6]
+        np.testing.assert_array_equal(rows[:, :3], np.repeat(np.eye(3), 2, axis=0) * np.tile([1, -1], 3)[:, None])
+        gain = SETTING.limit_gain
+        low, high = np.maximum(-1.0, gain * (-1.0 - q)), np.minimum(1.0, gain * (1.0 - q))
+        np.testing.assert_allclose(rows[::2, 32], low, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rows[1::2, 32], -high, rtol=0, atol=1e-12)
+        assert not rows[:, 33].any()
+
+
 def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
     """Both Pandas, against an obstacle and against each other."""
     robot, rng = facing_pandas(), np.random.default_rng(0)
