@@ -64,6 +64,7 @@ PLANNER_ORDER = [
     "leg",
     "planning",
     "reactive",
+    "refine",
     "segment",
     "demo",
     "demo_io",

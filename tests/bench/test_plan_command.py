@@ -86,6 +86,9 @@ def test_the_lines_tell_what_was_found(capsys):
     assert run_plan("sphere", [], None, None, judged=False) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "more than must be kept, at the ticks" in lines[1]
+    spare = 1e3 * (certify(planned("sphere").log).clearance - planned("sphere").settings.safety.distance)
+    # a sample may be a little farther than the closest moment between samples
+    assert spare - 0.1 < float(lines[1].split()[1]) < spare + 1.0
     assert lines[3].startswith("not judged")
 
 
