@@ -50,11 +50,12 @@ check: lint types test ## lint, types and tests
 perf: $(VENV)/.developed ## the table of speeds
 	@$(BIN)/onedemo perf
 
-soak: $(VENV)/.developed ## try for an hour to break the guard; the result is bench/soak.json
+soak: $(VENV)/.developed ## a million steps that try to break the guard; the result is bench/soak.json
 	@$(BIN)/python tests/soak.py --guard 1000000 --seed 0 --output bench/soak.json
 
-study: $(VENV)/.developed ## plan in a thousand random scenes, judged; the result is bench/scenes.json
+study: $(VENV)/.developed ## plan in a thousand random scenes, judged; and change each setting: bench/scenes.json, ablation.json
 	@$(BIN)/python tests/scene_study.py --count 150 --output bench/scenes.json
+	@$(BIN)/python tests/repet_ablation.py --count 20 --output bench/ablation.json
 
 bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
 	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"

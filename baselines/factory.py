@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -64,6 +64,8 @@ def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) 
 
 def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:
     """Refuse keys that no field has: validation of dataclasses would pass over them."""
+    # of an optional settings class, the class
+    kind = next((part for part in get_args(kind) if is_dataclass(part)), kind)
     if not (is_dataclass(kind) and isinstance(values, Mapping)):
         return
     allowed, types = [field.name for field in fields(kind)], get_type_hints(kind)

@@ -61,9 +61,9 @@ def plan(
 ) -> None:
     """Plan one motion round obstacles, without a simulator, and draw it.
 
-    Keys of a scene: robot, demonstration, start, goal, obstacles, held, allowed, settings, seed. Shipped scenes:
-    free, sphere, wall_gap, shelf, clutter, cage. The exit code is 1 where no plan was found, which is said with the
-    reason, and 2 for a scene that cannot be used.
+    Keys of a scene: title, robot, demonstration, start, goal, obstacles, held, allowed, settings, seed. Shipped
+    scenes: free, sphere, wall_gap, shelf, clutter, cage. The exit code is 1 where no plan was found, which is said
+    with the reason, 2 for a scene that cannot be used, and 3 for a plan that the judge refuses.
 
     Example: onedemo plan wall_gap --figure gap.png
     """

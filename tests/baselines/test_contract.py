@@ -146,6 +146,7 @@ def test_a_goal_out_of_reach_is_a_reason_not_an_exception(env):
 @pytest.mark.parametrize(
     "settings, error, message",
     [
+        ({"repet": {"shel": 1}}, BadConfig, "repet.shel: unknown key; allowed: distance, shell,"),
         ({"trimm": 1}, BadConfig, "trimm: unknown key; allowed: motion, repet, safety, resample, trim"),
         ({"motion": {"controller": {"gian": 1}}}, BadConfig, "motion.controller.gian: unknown key; allowed: law, gain"),
         ({"motion": {"guide": "far"}}, BadConfig, "motion.guide: .*number"),

@@ -36,7 +36,7 @@ def called(monkeypatch, capsys, *arguments):
     return stopped.value.code, said.out, said.err
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]])
 def test_every_command_explains_itself(command, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = called(monkeypatch, capsys, *command, "--help")
