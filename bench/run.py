@@ -106,8 +106,8 @@ def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[An
 
     from .. import envs  # noqa: F401  (registers the ids)
     from ..baselines.factory import make_policy
+    from ..planner import motions, reactive
     from ..planner.demo_io import load_demonstration
-    from ..planner.motions import warm_up
 
     _check_names(config, source, overrides)
     file = demonstration_path(config.demonstration)
@@ -124,8 +124,9 @@ def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[An
             max_episode_steps=max(1, round(config.max_seconds * 50)),
         )
     task = env.unwrapped.task
-    for arm in task.arms:
-        warm_up(arm)
+    for arm, body in zip(task.arms, task.bodies, strict=True):
+        motions.warm_up(arm)
+        reactive.warm_up(arm, body)
     return env, make_policy(config.method, task, demonstration, config.settings)
 
 

@@ -22,12 +22,12 @@ from .clearance import room_at, room_of_near
 from .errors import BadOption
 from .guarded import guarded_tick
 from .planning import Planner, PlanSettings
-from .pose import METERS_PER_RADIAN, PosePath
+from .pose import METERS_PER_RADIAN, Pose, PosePath
 from .pursuit import ARRIVED, INDEX, WAITED
 from .safety import BLOCKED as UNSAFE
 from .safety import safe_velocity
 from .scene_work import Layout, SceneWork
-from .shapes import Obstacle
+from .shapes import Obstacle, Sphere
 from .workspace import PURSUIT, bound
 
 FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
@@ -285,3 +285,18 @@ def _same_scene(before: Sequence[Obstacle], now: Sequence[Obstacle]) -> bool:
             if math.hypot(distance, METERS_PER_RADIAN * angle) > SAME_PLACE:
                 return False
     return True
+
+
+def warm_up(arm: Arm, body: Body) -> None:
+    """Compile, or load from the cache, what following among obstacles may need, so that no tick has to wait for it."""
+    low, high = np.maximum(arm.lower, -1.0), np.minimum(arm.upper, 1.0)
+    q = 0.5 * (low + high)
+    path = PosePath(arm.fk(q).dq[None])
+    things = (Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.0, 0.0, 50.0]), np.array([0.0, 0.0, 1e-3])),)
+    planner = ReactivePlanner(arm, body)
+    for seen in (things, (replace(things[0], velocity=np.zeros(3)),)):
+        planner.see(seen)
+        planner.go(path)
+        planner.step(q)
+        planner.see(tuple(obstacle.at(0.02) for obstacle in seen))
+        planner.step(q)

@@ -22,6 +22,7 @@ from onedemo.planner.reactive import (
     WAITING,
     ReactivePlanner,
     ReactiveSettings,
+    warm_up,
 )
 from onedemo.planner.scene_work import SceneWork
 from onedemo.planner.shapes import Box, Obstacle, Sphere
@@ -203,3 +204,7 @@ def test_loosely_is_less_than_exactly():
 def test_absurd_settings_are_refused(change):
     with pytest.raises(BadOption):
         replace(ReactiveSettings(), **change)
+
+
+def test_warming_up_needs_no_more_than_an_arm_and_its_body():
+    warm_up(*robot())
