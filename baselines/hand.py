@@ -9,7 +9,6 @@ import numpy as np
 from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.errors import PlanFailed
-from ..planner.motions import MotionSettings
 from ..planner.pose import Pose, PosePath
 from ..planner.reactive import DONE, FAILED, ReactivePlanner, ReactiveSettings
 from ..planner.shapes import Shape
@@ -45,11 +44,6 @@ class Hand:
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self._empty = OPEN, body
         self._planner = ReactivePlanner(arm, body, settings)
-
-    @property
-    def motion(self) -> MotionSettings:
-        """How motions are made."""
-        return self.settings
 
     @property
     def measured_tcp(self) -> Pose:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..planner.body_models import resting_pairs
 from ..planner.errors import BadOption
+from ..planner.robot_work import PREVIOUS
 from ..planner.safety import SafetyLayer, SafetySettings
 from .policy import Observation
 from .surroundings import Surroundings
@@ -54,7 +55,8 @@ class SafeActions(gym.Wrapper):
         """Start an episode; the commanded joints are those observed."""
         observation, info = self.env.reset(**kwargs)
         self._q = np.array(observation["joint_positions"])
-        self._observation = observation
+        # nothing of the last episode: the layer remembers speeds
+        self._observation, self._layer = observation, None
         return observation, {**info, "safety": 0}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -81,10 +83,12 @@ class SafeActions(gym.Wrapper):
             self._key = (obstacles, near)
             task = self._task
             allowed = [("fingers", name) for name in near]
-            self._layer = SafetyLayer(
+            before, self._layer = self._layer, SafetyLayer(
                 task.arms, task.bodies, obstacles, task.control_dt,
                 settings=self.settings, allowed=allowed, pairs=self._pairs,
             )  # fmt: skip
+            if before is not None:
+                self._layer.work[PREVIOUS] = before.work[PREVIOUS]
         return self._layer
 
     def _near_objects(self) -> list[str]:

@@ -51,3 +51,16 @@ def test_the_gripper_is_left_alone():
 def test_twists_are_refused():
     with pytest.raises(BadOption, match="joint_velocity"):
         SafeActions(gym.make("onedemo/Stack-v0", control_mode="ee_twist"))
+
+
+def test_an_episode_does_not_depend_on_the_one_before():
+    env, ends = SafeActions(gym.make("onedemo/Stack-v0")), []
+    for first in (3, 4):
+        env.reset(seed=first)
+        for _ in range(5 * first):
+            env.step(np.full(8, 0.3))
+        env.reset(seed=7)
+        for _ in range(60):
+            observation, *_ = env.step(np.full(8, -0.4))
+        ends.append(observation["joint_positions"])
+    np.testing.assert_array_equal(*ends)
