@@ -35,8 +35,8 @@ demo: $(VENV)/.installed ## stack three blocks from one demonstration: report, f
 test: $(VENV)/.developed ## run the tests
 	@$(BIN)/python -m pytest -m "not slow"
 
-slow: $(VENV)/.developed ## run the long tests too
-	@$(BIN)/python -m pytest
+slow: $(VENV)/.developed ## run the long tests too, on newly drawn values
+	@$(BIN)/python -m pytest --hypothesis-profile=default
 
 lint: $(VENV)/.developed ## ruff
 	@$(BIN)/ruff check $(FOLDERS)
