@@ -17,7 +17,6 @@ from ..planner.errors import PlanFailed
 from ..planner.motions import Motion, plan_motion, reachable_departure
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
-from ..planner.shapes import Box
 from .hand import CLOSE, OPEN, Hand
 from .policy import LabeledPath
 from .surroundings import TABLE
@@ -89,7 +88,7 @@ class StackProgram:
     def _place(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
         grasped = self._held(k)
-        self.hand.hold(k, Box(tuple(target.size)), grasped)
+        self.hand.hold(k, target.shape, grasped)
         lift = self._way_out(self.transfer)
         yield from self.hand.follow(lift, loosely=True)
         # the object slips a little while it is lifted: the goal is computed from how it is held now

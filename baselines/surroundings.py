@@ -8,12 +8,14 @@ import numpy as np
 
 from ..envs.task import TaskDescription
 from ..planner.pose import Pose
-from ..planner.shapes import Box, Obstacle
+from ..planner.shapes import Box, Capsule, Obstacle, Shape, Sphere
 from .policy import Observation
 
 TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Distances [m] to keep from what the task itself brings close: things are put down there."""
+LAG = 0.05
+"""Seconds by which the arm is behind its commands."""
 MOVED = 1e-3
 """Change of a pose vector's entry from which an object is in another place."""
 
@@ -22,9 +24,9 @@ class Surroundings:
     """The obstacles of one arm, renewed only when something has moved.
 
     Args:
-        task: with the fixtures and the objects' sizes.
+        task: with the fixtures and the objects' shapes.
         table_margin: distance [m] to keep from the table.
-        margin: distance [m] to keep from objects.
+        margin: distance [m] to keep from objects and furniture.
 
     Attributes:
         allowed: contacts that are wanted: (part of the body or "held", name of a thing).
@@ -32,9 +34,10 @@ class Surroundings:
 
     def __init__(self, task: TaskDescription, *, table_margin: float = TABLE_MARGIN, margin: float = OBJECT_MARGIN):
         self.allowed: tuple[tuple[str, str], ...] = ()
-        self._objects, self._held, self._margin = task.objects, None, margin
+        self._task, self._held, self._margin = task, None, margin
         self._fixed = tuple(replace(f, margin=table_margin) if f.name == TABLE else f for f in task.fixtures)
-        self._poses = np.full((len(task.objects), 7), np.inf)
+        self._poses = np.full((len(task.objects) + len(task.furniture), 7), np.inf)
+        self._things: tuple[Obstacle, ...] = ()
         self._seen: tuple[Obstacle, ...] = ()
 
     def without(self, index: int | None) -> None:
@@ -45,15 +48,45 @@ class Surroundings:
     def seen(self, observation: Observation) -> tuple[Obstacle, ...]:
         """The obstacles as observed; the same tuple while nothing has moved."""
         poses = observation["object_pose"]
+        if self._task.furniture:
+            poses = np.concatenate([poses, observation["furniture_pose"]])
         moved = np.abs(poses - self._poses).max(axis=1) > MOVED
         if self._held is not None:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
+        intruders = intruders_of(observation)
         if moved.any():
             self._poses[:] = poses
-            objects = (
-                Obstacle(Box(tuple(each.size)), Pose.from_vector(pose), name=each.name, margin=self._margin)
-                for k, (each, pose) in enumerate(zip(self._objects, poses, strict=True))
-                if k != self._held
-            )
-            self._seen = (*self._fixed, *objects)
+            self._things = self._renewed(poses)
+        if moved.any() or intruders or len(self._seen) > len(self._things):
+            self._seen = (*self._things, *intruders) if intruders else self._things
         return self._seen
+
+    def _renewed(self, poses: np.ndarray) -> tuple[Obstacle, ...]:
+        objects, furniture, margin = self._task.objects, self._task.furniture, self._margin
+        around = [
+            Obstacle(each.shape, Pose.from_vector(pose), name=each.name, margin=margin)
+            for k, (each, pose) in enumerate(zip(objects, poses, strict=False))
+            if k != self._held
+        ]
+        for each, pose in zip(furniture, poses[len(objects) :], strict=True):
+            around += [replace(part, margin=margin) for part in each.at(Pose.from_vector(pose))]
+        return (*self._fixed, *around)
+
+
+def intruders_of(observation: Observation) -> tuple[Obstacle, ...]:
+    """What is in the way, as observed; moving ones where they will be when a command has taken effect."""
+    found = []
+    for slot in np.flatnonzero(observation["obstacle_active"]):
+        pose = Pose.from_vector(observation["obstacle_pose"][slot])
+        velocity = observation["obstacle_velocity"][slot]
+        ahead = Pose.from_position_quaternion(LAG * velocity) @ pose
+        shape = _shape(int(observation["obstacle_shape"][slot]), observation["obstacle_size"][slot])
+        found.append(Obstacle(shape, ahead, velocity, f"obstacle{slot}"))
+    return tuple(found)
+
+
+def _shape(kind: int, size: np.ndarray) -> Shape:
+    """The shape of an observed obstacle; see the observation's `obstacle_shape` and `obstacle_size`."""
+    if kind == 2:
+        return Box((float(size[0]), float(size[1]), float(size[2])))
+    return Sphere(float(size[0])) if kind == 1 else Capsule(float(size[0]), float(size[2]))

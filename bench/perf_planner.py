@@ -39,7 +39,7 @@ def _panda() -> tuple[Any, Any, np.ndarray]:
     from ..envs.bodies import robot_body
     from ..envs.scene import compiled_scene
 
-    scene = compiled_scene("Panda", ())
+    scene = compiled_scene("Panda")
     return scene.arms[0].arm, robot_body("Panda"), np.array(scene.home[0])
 
 

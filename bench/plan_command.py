@@ -151,7 +151,7 @@ def _robot(scene: Scene) -> tuple[Arm, Body, np.ndarray]:
     if robot not in ROBOTS:
         with scene.blaming("robot"):
             raise UnknownName("robot", robot, ROBOTS)
-    compiled = compiled_scene(robot, ())
+    compiled = compiled_scene(robot)
     return compiled.arms[0].arm, robot_body(robot), compiled.home[0]
 
 

@@ -133,7 +133,7 @@ def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[An
 def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
     """Refuse unknown names, and say where they were written."""
     from ..baselines.factory import POLICIES
-    from ..envs.layouts import LEVELS
+    from ..envs.levels import LEVELS
     from ..envs.scene import ROBOTS
 
     changed = {text.partition("=")[0] for text in overrides}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -11,12 +12,17 @@ import numpy as np
 
 from ..planner.errors import BadAction, BadOption, UnknownName
 from ..planner.pose import Pose
+from ..planner.shapes import Obstacle as Solid
 from . import spaces as space
-from .boxes import Box
-from .render import Ghost, Renderer
-from .sim import PHYSICS_DT, Simulation
+from .levels import checked_obstacles, level_named
+from .obstacles import Intruder
+from .placement import Leg, Order, Stage, placed
+from .render import TABLE_VIEW, Ghost, Renderer, View
+from .scene import OBSTACLE
+from .sim import PHYSICS_DT, Simulation, Start
 from .state import State
 from .task import TaskDescription
+from .things import Things
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
@@ -24,6 +30,10 @@ MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
 """Tcp speeds [m/s, rad/s] of a full `ee_twist` action."""
 TWIST_DAMPING = 0.02
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
+SLOTS = 3
+"""Obstacles that there can be at once."""
+MAX_LAYOUTS = 40
+"""Starts that are drawn before a place for the obstacles must have been found."""
 Observation = dict[str, np.ndarray]
 
 
@@ -47,19 +57,24 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         self,
         *,
         robot: str,
-        boxes: tuple[Box, ...],
+        things: Things,
+        level: str,
+        obstacles: str | None,
         control_mode: str,
         reward: str,
         render_mode: str | None,
         control_frequency: int,
+        view: View = TABLE_VIEW,
     ):
+        level_named(level)
+        self.level, self.obstacles = level, None if obstacles is None else checked_obstacles(obstacles, SLOTS)
         self.control_mode = checked_choice("control_mode", control_mode, CONTROL_MODES)
         self.reward_kind = checked_choice("reward", reward, REWARDS)
         if render_mode is not None:
             checked_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         self.render_mode = render_mode
         self.substeps = _substeps(control_frequency)
-        self.sim = Simulation(robot, boxes)
+        self.sim = Simulation(robot, replace(things, obstacles=SLOTS))
         self.arms = tuple(index.arm for index in self.sim.scene.arms)
         self.metadata = {**METADATA, "render_fps": control_frequency}
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
@@ -67,6 +82,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
         self._action = np.zeros(self.action_space.shape or ())
         self._renderer: Renderer | None = None
+        self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
 
     @property
     @abstractmethod
@@ -79,8 +95,14 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         return self.substeps * PHYSICS_DT
 
     @abstractmethod
-    def _start(self, options: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-        """Joints (n_arms, dof) and object poses (n, 7) of a new episode; sets the task's own state."""
+    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+        """Where things are in a new episode, obstacles aside; sets the task's own state.
+
+        Args:
+            options: those of `reset`, but for "level" and "obstacles"; unknown keys are refused.
+            layout: name of the ranges to draw from.
+            spacious: there will be obstacles, which need room.
+        """
 
     @abstractmethod
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
@@ -90,18 +112,66 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
     def _goals(self) -> tuple[np.ndarray, float]:
         """Goal poses (n, 7) and the index of the current motion."""
 
+    @abstractmethod
+    def _legs(self, start: Start) -> list[Leg]:
+        """The motions of the hand that obstacles are put in the way of, in order."""
+
+    def _ghosts(self) -> list[Ghost]:
+        """What is drawn but not there: the goals, if they are places of objects."""
+        return []
+
+    def _paper(self, legs: list[Leg]) -> list[Order]:
+        """The paper's obstacles."""
+        raise BadOption("obstacles", f"the paper shows no obstacle in {self.task.name}")
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode; the same seed and options give the same bits."""
         super().reset(seed=seed)
-        joints, poses = self._start(dict(options or {}))
-        self.sim.reset(joints, poses)
+        self._steps = self._contacts = 0
+        self.sim.reset(self._started(dict(options or {})))
+        observation, *_, info = self._reached()
+        return observation, info
+
+    def _started(self, options: dict[str, Any]) -> Start:
+        """A start with its obstacles; starts beside which none has room are drawn anew."""
+        level = level_named(options.pop("level", self.level))
+        wanted = level.obstacles if self.obstacles is None else self.obstacles
+        wanted = checked_obstacles(options.pop("obstacles", wanted), SLOTS)
+        self._refused = 0
+        for _ in range(MAX_LAYOUTS):
+            start = self._start(dict(options), level.layout, wanted != "none")
+            intruders = wanted if isinstance(wanted, tuple) else self._intruders(wanted, start)
+            if intruders is not None:
+                return start._replace(intruders=intruders)
+            self._refused += 1
+        raise BadOption("obstacles", f"no room for {wanted!r} obstacles beside this start")
+
+    def _intruders(self, kind: str, start: Start) -> tuple[Intruder, ...] | None:
+        if kind == "none":
+            return ()
+        task, legs = self.task, self._legs(start)
+        solids = [*task.fixtures]
+        for each, pose in zip(task.objects, start.objects, strict=True):
+            solids.append(Solid(each.shape, Pose.from_vector(pose), name=each.name))
+        for each, pose in zip(task.furniture, start.furniture, strict=True):
+            solids += each.at(Pose.from_vector(pose))
+        stage = Stage(legs, task.arms[0], task.bodies[0], start.joints[0], solids, task.table_height)
+        return placed(self.np_random, kind, stage, self._paper(legs) if kind == "paper" else None)
+
+    def _reached(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """What Gymnasium wants to know of the state that the simulation is in."""
         state = self.sim.read()
-        _, _, info = self._judge(state)
+        reward, terminated, info = self._judge(state)
+        if self.sim.obstacles.intruders:
+            touching = state.touching
+            self._contacts += bool(touching[OBSTACLE].any() or touching[:, OBSTACLE].any())
+        info["n_contacts"], info["min_obstacle_distance"] = self._contacts, self.sim.nearest_obstacle()
+        info["layouts_refused"] = self._refused
         if self.render_mode == "human":
             self._show()
-        return self._observation(state), info
+        return self._observation(state), reward, terminated, False, info
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step.
@@ -110,25 +180,22 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             BadAction: not an array of real numbers, of the wrong shape, or not finite.
         """
         self._take(action)
+        if self.sim.obstacles.intruders:
+            self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self._goals()[1])
         if self.control_mode == "joint_velocity":
             bad = self.sim.step(self._action, self._speed_limits, 1.0, self.substeps)
         else:
             bad = self._step_twists()
         if bad >= 0:
             raise BadAction(f"entry {bad} is not finite")
-        state = self.sim.read()
-        reward, terminated, info = self._judge(state)
-        if self.render_mode == "human":
-            self._show()
-        return self._observation(state), reward, terminated, False, info
+        self._steps += 1
+        return self._reached()
 
     def render(self) -> np.ndarray | None:
         """An image (height, width, 3) uint8 in the mode "rgb_array"; OpenGL is opened by the first call."""
         if self.render_mode != "rgb_array":
             return None
-        sizes = [item.size for item in self.task.objects]
-        ghosts = [Ghost(pose, size) for pose, size in zip(self._goals()[0], sizes, strict=True)]
-        return self._opened_renderer().image(self.sim.data, ghosts)
+        return self._opened_renderer().image(self.sim.data, self._ghosts())
 
     def close(self) -> None:
         """Close the window or the image buffer, if there is one."""
@@ -141,7 +208,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
 
     def _opened_renderer(self) -> Renderer:
         if self._renderer is None:
-            self._renderer = Renderer(self.sim.model)
+            self._renderer = Renderer(self.sim.model, self._view)
         return self._renderer
 
     def _take(self, action: np.ndarray) -> None:
@@ -188,7 +255,13 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             "object_pose": state.object_pose,
             "goal_pose": goals,
             "motion_index": np.array([motion]),
+            **self.sim.obstacles.observed(self._steps * self.control_dt),
+            **self._more_observed(state),
         }
+
+    def _more_observed(self, state: State) -> Observation:
+        """Entries of the observation that only some tasks have."""
+        return {}
 
 
 def _substeps(control_frequency: int) -> int:

@@ -20,7 +20,7 @@ DIGITS = 5
 
 def fitted_bodies(robot: str) -> tuple[Body, ...]:
     """The bodies of a robot's arms, fitted to its collision geometry; takes some seconds per arm."""
-    scene = compiled_scene(robot, ())
+    scene = compiled_scene(robot)
     bodies = [body_from_mujoco(scene.model, index.arm, index.arm.joint_names) for index in scene.arms]
     return tuple(_rounded(body) for body in bodies)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 
 BASE_PLACE = (0.10, 0.0)
 """Nominal place [m] of the stack on the table."""
@@ -18,11 +18,13 @@ NEAREST, FARTHEST = 0.32, 0.70
 """Distance of blocks from the arm's base axis [m]: what an arm reaches with a level hand."""
 TABLE_EDGE = 0.36
 """Largest |x| and |y| of a block's center on the table [m]."""
+LONG_GAP = 0.30
+"""Of blocks to the base place where there are obstacles [m]: a shorter way has no room for one beside a hand."""
 MAX_TRIES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class Ranges:
     """How far a layout may differ from the nominal one.
 
     Attributes:
@@ -38,11 +40,12 @@ class Level:
     joints: float
 
 
-LEVELS = {
-    "L0": Level(0.0, 0.0, 0.0, 0.0),
-    "L1": Level(0.10, 0.05, np.deg2rad(30.0), 0.05),
-    "L2": Level(0.20, 0.10, np.deg2rad(120.0), 0.15),
+RANGES = {
+    "L0": Ranges(0.0, 0.0, 0.0, 0.0),
+    "L1": Ranges(0.10, 0.05, np.deg2rad(30.0), 0.05),
+    "L2": Ranges(0.20, 0.10, np.deg2rad(120.0), 0.15),
 }
+"""By the name of a layout, see `levels`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,17 +63,6 @@ class Layout:
     joints: np.ndarray
 
 
-def level_named(name: object) -> Level:
-    """The level of a name.
-
-    Raises:
-        UnknownName: no such level.
-    """
-    if not isinstance(name, str) or name not in LEVELS:
-        raise UnknownName("level", name, LEVELS)
-    return LEVELS[name]
-
-
 def nominal_blocks(count: int) -> np.ndarray:
     """(count, 2) places of the blocks at level L0 [m]."""
     order = (-1.0, 0.0, 1.0)
@@ -78,33 +70,39 @@ def nominal_blocks(count: int) -> np.ndarray:
 
 
 def stack_layout(
-    rng: np.random.Generator, level: Level, count: int, arm_axis: np.ndarray, joints: tuple[int, ...]
+    rng: np.random.Generator,
+    ranges: Ranges,
+    count: int,
+    arm_axis: np.ndarray,
+    joints: tuple[int, ...],
+    base_gap: float = BASE_GAP,
 ) -> Layout:
     """A layout of blocks and base place by rejection: independent of any method.
 
     Args:
         rng: source of randomness.
-        level: ranges.
+        ranges: how far it may differ from the nominal one.
         count: number of blocks.
         arm_axis: (2,) x, y of the arm's base axis [m].
         joints: shape (n_arms, dof) of the start joints.
+        base_gap: least distance of the blocks to the base place [m].
 
     Raises:
         BadOption: no layout was found in a bounded number of tries.
     """
-    offsets = rng.uniform(-level.joints, level.joints, joints)
+    offsets = rng.uniform(-ranges.joints, ranges.joints, joints)
     nominal = nominal_blocks(count)
     for _ in range(MAX_TRIES):
-        places = nominal + rng.uniform(-level.block, level.block, (count, 2))
-        base = np.array(BASE_PLACE) + rng.uniform(-level.base, level.base, 2)
-        if fits(places, base, arm_axis):
-            yaws = rng.uniform(-level.yaw, level.yaw, count + 1)
+        places = nominal + rng.uniform(-ranges.block, ranges.block, (count, 2))
+        base = np.array(BASE_PLACE) + rng.uniform(-ranges.base, ranges.base, 2)
+        if fits(places, base, arm_axis, base_gap):
+            yaws = rng.uniform(-ranges.yaw, ranges.yaw, count + 1)
             blocks = np.column_stack([places, yaws[:count]])
             return Layout(blocks, np.append(base, yaws[count]), offsets)
     raise BadOption("n_blocks", f"{count} blocks do not fit on the table at this level")
 
 
-def fits(places: np.ndarray, base: np.ndarray, arm_axis: np.ndarray) -> bool:
+def fits(places: np.ndarray, base: np.ndarray, arm_axis: np.ndarray, base_gap: float = BASE_GAP) -> bool:
     """The blocks (n, 2) keep their distances to each other, to the base place (2,) and to the arm's axis."""
     reach = np.linalg.norm(places - arm_axis, axis=1)
     between = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
@@ -113,5 +111,5 @@ def fits(places: np.ndarray, base: np.ndarray, arm_axis: np.ndarray) -> bool:
         and (reach <= FARTHEST).all()
         and (np.abs(places) <= TABLE_EDGE).all()
         and (between >= BLOCK_GAP).all()
-        and (np.linalg.norm(places - base, axis=1) >= BASE_GAP).all()
+        and (np.linalg.norm(places - base, axis=1) >= base_gap).all()
     )

@@ -16,10 +16,11 @@ import mujoco
 import numpy as np
 
 from ..planner.errors import RenderingUnavailable
+from ..planner.shapes import Shape
+from .things import half_sizes
 
 LOGGER = logging.getLogger(__name__)
 WIDTH, HEIGHT = 640, 480
-LOOK_AT, DISTANCE, AZIMUTH, ELEVATION = (-0.12, 0.0, 0.93), 1.05, 148.0, -24.0
 GHOST_COLOR = (0.35, 0.55, 0.95, 0.16)
 BACKENDS = {"egl": "EGL", "osmesa": "OSMesa", "glfw": None}
 """MuJoCo's offscreen backends and the library that each needs."""
@@ -52,19 +53,41 @@ def _opened_context(width: int, height: int) -> Any:
 
 
 @dataclass(frozen=True)
+class View:
+    """Where the camera is.
+
+    Attributes:
+        look_at: (3,) what it looks at [m].
+        distance: from there [m].
+        azimuth: direction that it looks in [degrees].
+        elevation: negative from above [degrees].
+    """
+
+    look_at: tuple[float, float, float] = (-0.12, 0.0, 0.93)
+    distance: float = 1.05
+    azimuth: float = 148.0
+    elevation: float = -24.0
+
+
+TABLE_VIEW = View()
+
+
+@dataclass(frozen=True)
 class Ghost:
-    """A box that is drawn but not there: pose (7,) and full extents (3,) [m]."""
+    """A shape that is drawn but not there, at a pose (7,)."""
 
     pose: np.ndarray
-    size: np.ndarray
+    shape: Shape
 
 
 def _add(scene: mujoco.MjvScene, ghost: Ghost) -> None:
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, ghost.pose[3:])
     geom = scene.geoms[scene.ngeom]
-    kind, color = mujoco.mjtGeom.mjGEOM_BOX, np.array(GHOST_COLOR, dtype=np.float32)
-    mujoco.mjv_initGeom(geom, kind, 0.5 * ghost.size, ghost.pose[:3], matrix, color)
+    name, half = half_sizes(ghost.shape)
+    kind, color = getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}"), np.array(GHOST_COLOR, dtype=np.float32)
+    size = np.array(half if name == "box" else (half[0], half[0], half[1] if name != "sphere" else half[0]))
+    mujoco.mjv_initGeom(geom, kind, size, ghost.pose[:3], matrix, color)
     scene.ngeom += 1
 
 
@@ -112,8 +135,8 @@ class _Offscreen:
 class Renderer:
     """The scene's camera: pictures in memory, or MuJoCo's window."""
 
-    def __init__(self, model: mujoco.MjModel):
-        self._model = model
+    def __init__(self, model: mujoco.MjModel, view: View):
+        self._model, self._view = model, view
         self._camera = mujoco.MjvCamera()
         self._aim(self._camera)
         self._options = mujoco.MjvOption()
@@ -125,7 +148,7 @@ class Renderer:
         self._told = False
 
     def image(self, data: mujoco.MjData, ghosts: Iterable[Ghost] = ()) -> np.ndarray:
-        """(HEIGHT, WIDTH, 3) uint8; ghosts are drawn as translucent boxes.
+        """(HEIGHT, WIDTH, 3) uint8; ghosts are translucent.
 
         Raises:
             RenderingUnavailable: no OpenGL library can be used.
@@ -161,7 +184,10 @@ class Renderer:
             self._told = True
         return found
 
-    @staticmethod
-    def _aim(camera: mujoco.MjvCamera) -> None:
-        camera.lookat[:] = LOOK_AT
-        camera.distance, camera.azimuth, camera.elevation = DISTANCE, AZIMUTH, ELEVATION
+    def _aim(self, camera: mujoco.MjvCamera) -> None:
+        camera.lookat[:] = self._view.look_at
+        camera.distance, camera.azimuth, camera.elevation = (
+            self._view.distance,
+            self._view.azimuth,
+            self._view.elevation,
+        )

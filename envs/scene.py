@@ -17,14 +17,15 @@ from ..planner.errors import UnknownName
 from ..planner.pose import Pose
 from ..planner.shapes import Box as BoxShape
 from ..planner.shapes import Capsule, Cylinder, Obstacle, Shape, Sphere
-from .boxes import Box
+from .things import NOTHING, Things
 
 ROBOTS = {
     "Panda": (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
 }
 """The robots that are supported, with their joint speed limits [rad/s] (the maker's data sheet)."""
-WORLD, ARM, FINGERS, FIRST_OBJECT = 0, 1, 2, 3
-"""Who a geom belongs to: the table and the floor, an arm, its fingers, or object k as FIRST_OBJECT + k."""
+WORLD, ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, OBSTACLE, FURNITURE, BEAD, FIRST_OBJECT = range(9)
+"""Who a geom belongs to: what is fixed to the world, the first arm, its fingers, the second arm, its fingers, an
+obstacle, furniture, a bead, or object k as FIRST_OBJECT + k."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,10 @@ class Scene:
         model: MuJoCo's model.
         arms: the arms.
         home: (n_arms, dof) the robot's usual joints.
-        objects: body ids of the boxes.
+        objects: body ids of the free objects.
+        furniture: mocap ids of the furniture.
+        obstacles: (n, 3) body, solid geom and visible geom of each obstacle.
+        beads: (n, 3) addresses of the beads' places in `qpos`.
         owner: (ngeom,) whose geom it is, see WORLD.
         labels: (ngeom,) names for messages.
         fixtures: what stands still for ever and is solid, the robot's own base and the floor left out.
@@ -76,33 +80,46 @@ class Scene:
     arms: tuple[ArmIndex, ...]
     home: np.ndarray
     objects: np.ndarray
+    furniture: np.ndarray
+    obstacles: np.ndarray
+    beads: np.ndarray
     owner: np.ndarray
     labels: tuple[str, ...]
     fixtures: tuple[Obstacle, ...]
 
 
 @lru_cache(maxsize=8)
-def compiled_scene(robot: str, boxes: tuple[Box, ...]) -> Scene:
-    """The scene of a robot at a table with boxes; compiled once per process.
+def compiled_scene(robot: str, things: Things = NOTHING) -> Scene:
+    """The scene of a robot at a table with things; compiled once per process.
 
     Raises:
         UnknownName: no such robot.
     """
     if robot not in ROBOTS:
         raise UnknownName("robot", robot, ROBOTS)
-    env = _model_library().table_env(robot, boxes)
+    env = _model_library().table_env(robot, things)
     model = copy.copy(env.sim.model._model)
     rob = env.robots[0]
     arms = tuple(_arm_index(model, env, robot, side) for side in rob.arms)
     home = np.array(rob.init_qpos, dtype=np.float64).reshape(len(arms), -1)
-    bodies = [_id(model, mujoco.mjtObj.mjOBJ_BODY, box.root_body) for box in env.boxes]
-    owner, labels = _owners(model, env, boxes, bodies)
-    return Scene(model, arms, home, np.array(bodies), owner, labels, _fixtures(model, owner))
+    objects = np.array([_body_of(model, each.name) for each in things.objects], dtype=np.int64)
+    furniture = np.array([model.body(each.name).id for each in things.furniture], dtype=np.int64)
+    bodies = [model.body(f"obstacle{k}").id for k in range(things.obstacles)]
+    obstacles = np.array([(body, *_geoms(model, body)) for body in bodies], dtype=np.int64).reshape(-1, 3)
+    beads = [model.body(f"bead{k}").id for k in range(things.beads.count)] if things.beads else []
+    joints = model.body_jntadr[np.array(beads, dtype=np.int64)]
+    places = model.jnt_qposadr[joints[:, None] + np.arange(3)].astype(np.int64)
+    known = {**{int(body): FIRST_OBJECT + k for k, body in enumerate(objects)}, **dict.fromkeys(beads, BEAD)}
+    known |= {**{int(body): FURNITURE for body in furniture}, **dict.fromkeys(bodies, OBSTACLE)}
+    owner, labels = _owners(model, env, known)
+    still = _fixtures(model, owner)
+    mocap = model.body_mocapid[furniture].astype(np.int64)
+    return Scene(model, arms, home, objects, mocap, obstacles, places, owner, labels, still)
 
 
 def robot_arm(robot: str, index: int = 0) -> Arm:
     """The kinematics of a robot's arm as it stands at the table, tcp between the finger pads."""
-    return compiled_scene(robot, ()).arms[index].arm
+    return compiled_scene(robot).arms[index].arm
 
 
 def _model_library() -> Any:
@@ -115,8 +132,14 @@ def _model_library() -> Any:
         logging.disable(before)
 
 
-def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    return mujoco.mj_name2id(model, kind, name)
+def _body_of(model: mujoco.MjModel, name: str) -> int:
+    """Id of the body of an object; robosuite's own objects add a word to its name."""
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    return found if found >= 0 else model.body(f"{name}_main").id
+
+
+def _geoms(model: mujoco.MjModel, body: int) -> range:
+    return range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
 
 
 def _arm_index(model: mujoco.MjModel, env, robot: str, side: str) -> ArmIndex:
@@ -158,7 +181,8 @@ def _gripper_controls(model: mujoco.MjModel, gripper, grip: np.ndarray) -> tuple
     return ends[0], ends[1]
 
 
-def _owners(model: mujoco.MjModel, env, boxes: tuple[Box, ...], bodies: list[int]):
+def _owners(model: mujoco.MjModel, env, known: dict[int, int]) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Of every geom its owner and its name for messages; `known` are the owners of bodies that are things."""
     rob = env.robots[0]
     fingers = set()
     for side in rob.arms:
@@ -168,9 +192,9 @@ def _owners(model: mujoco.MjModel, env, boxes: tuple[Box, ...], bodies: list[int
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom])
         name = model.body(body).name
-        if body in bodies:
-            owner[geom] = FIRST_OBJECT + bodies.index(body)
-            labels.append(boxes[bodies.index(body)].name)
+        if body in known:
+            owner[geom] = known[body]
+            labels.append(name.removesuffix("_main"))
         elif geom in fingers:
             owner[geom] = FINGERS
             labels.append("fingers")

@@ -3,23 +3,44 @@
 from __future__ import annotations
 
 import copy
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from ..planner.chain import FRAME
-from .boxes import Box
+from .nearness import Nearness
+from .obstacles import Intruder, ObstacleSlots
 from .scene import FIRST_OBJECT, ArmIndex, compiled_scene
 from .state import State, command, read_arms, read_objects
+from .things import Things
 
 PHYSICS_DT = 0.002
+
+
+class Start(NamedTuple):
+    """Where everything is when an episode begins.
+
+    Attributes:
+        joints: (n_arms, dof) joint positions [rad].
+        objects: (n_objects, 7) world poses, x y z [m] and wxyz.
+        furniture: (n_furniture, 7) world poses.
+        beads: (n_beads, 3) places [m].
+        intruders: the obstacles.
+    """
+
+    joints: np.ndarray
+    objects: np.ndarray
+    furniture: np.ndarray = np.zeros((0, 7))
+    beads: np.ndarray = np.zeros((0, 3))
+    intruders: tuple[Intruder, ...] = ()
 
 
 class Simulation:
     """A scene being simulated: state in, physics, state out."""
 
-    def __init__(self, robot: str, boxes: tuple[Box, ...]):
-        self.scene = compiled_scene(robot, boxes)
+    def __init__(self, robot: str, things: Things):
+        self.scene = compiled_scene(robot, things)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         arms, data, model = self.scene.arms, self.data, self.model
@@ -34,27 +55,41 @@ class Simulation:
         self._chains = np.array([arm.arm.chain for arm in arms])
         self._frames = np.empty((arms[0].arm.dof, FRAME))
         self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
-        bodies, owners = self.scene.objects, FIRST_OBJECT + len(boxes)
+        bodies, owners = self.scene.objects, FIRST_OBJECT + len(things.objects)
         self._object_places = model.jnt_qposadr[model.body_jntadr[bodies]].astype(np.int64)
         self._object_index = np.column_stack([self._object_places, model.body_dofadr[bodies]])
         self._touching = np.zeros((owners, owners))
+        self.obstacles = ObstacleSlots(self.scene, model, data)
+        self._near = Nearness(self.scene, model, data)
+        self._no_beads = np.zeros((0, 3))
 
-    def reset(self, joints: np.ndarray, object_poses: np.ndarray) -> None:
-        """Put everything in place, at rest, with open grippers.
-
-        Args:
-            joints: (n_arms, dof) joint positions [rad].
-            object_poses: (n_objects, 7) world poses, x y z [m] and wxyz.
-        """
+    def reset(self, start: Start) -> None:
+        """Put everything in place, at rest, with open grippers."""
         mujoco.mj_resetData(self.model, self.data)
-        for arm, q in zip(self.scene.arms, joints, strict=True):
+        for arm, q in zip(self.scene.arms, start.joints, strict=True):
             self.data.qpos[arm.qpos] = q
             self.data.act[arm.act] = q
             self.data.ctrl[arm.grip] = arm.opened
             self.data.qpos[arm.finger_qpos] = arm.opened
-        for address, pose in zip(self._object_places, object_poses, strict=True):
+        for address, pose in zip(self._object_places, start.objects, strict=True):
             self.data.qpos[address : address + 7] = pose
+        if len(start.furniture):
+            self.data.mocap_pos[self.scene.furniture] = start.furniture[:, :3]
+            self.data.mocap_quat[self.scene.furniture] = start.furniture[:, 3:]
+        if len(start.beads):
+            self.data.qpos[self.scene.beads] = start.beads
+        self.obstacles.reset(start.intruders)
+        self._near.reset()
         mujoco.mj_forward(self.model, self.data)
+
+    def advance_obstacles(self, seconds: float, motion: float) -> None:
+        """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""
+        if self.obstacles.intruders:
+            self.obstacles.advance(seconds, motion, self._near.has_room)
+
+    def nearest_obstacle(self) -> float:
+        """Smallest distance [m] of the robot, or of what it holds, to an obstacle in this episode; infinite if none."""
+        return self._near.smallest(self.obstacles.active, self._touching)
 
     def step(self, action: np.ndarray, full: np.ndarray, bound: float, substeps: int) -> int:
         """Hold an action for some physics steps; -1, or the index of an entry that is not finite, without a step.
@@ -83,7 +118,8 @@ class Simulation:
         qpos, qvel, *frames = self._views
         read_arms(qpos, qvel, *frames, self._chains, self._frames, self._arm_index, self._homes, q, qdot, tcp, opening)
         read_objects(qpos, qvel, self._object_index, geoms, self.scene.owner, poses, velocities, self._touching)
-        return State(q, qdot, tcp, opening, poses, velocities, self._touching)
+        beads = qpos[self.scene.beads] if len(self.scene.beads) else self._no_beads
+        return State(q, qdot, tcp, opening, poses, velocities, self._touching, beads)
 
     def contact_name(self, pair: tuple[int, int]) -> str:
         """Name of a contact of two owners, as in `link5-block1`."""

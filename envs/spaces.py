@@ -13,6 +13,8 @@ REACH = 3.0
 """Bound of world coordinates [m]; what leaves it has long fallen off the table."""
 JOINT_SLACK = 0.1
 """A soft joint limit gives way by less than this [rad]."""
+LARGEST_OBSTACLE, FASTEST_OBSTACLE = 1.0, 2.0
+"""Bounds of an obstacle's extents [m] and speed [m/s]."""
 MAX_SPEED = 20.0
 """Bound of measured joint speeds [rad/s]; the servos command at most 3."""
 
@@ -33,9 +35,25 @@ def pose_box(count: int) -> spaces.Box:
 
 
 def observation_space(
-    arms: tuple[Arm, ...], gripper_width: tuple[float, ...], objects: int, motions: int
+    arms: tuple[Arm, ...],
+    gripper_width: tuple[float, ...],
+    objects: int,
+    goals: int,
+    motions: int,
+    obstacles: int,
+    **more: spaces.Box,
 ) -> spaces.Space[Any]:
-    """The observation of a task; its entries are described in the environment's docstring."""
+    """The observation of a task; its entries are described in the environment's docstring.
+
+    Args:
+        arms: their joints.
+        gripper_width: widest gaps [m].
+        objects: number of free objects.
+        goals: number of goals.
+        motions: largest motion index.
+        obstacles: number of slots.
+        more: entries of this task alone.
+    """
     shape = (len(arms), arms[0].dof)
     lower = np.stack([arm.lower for arm in arms]) - JOINT_SLACK
     upper = np.stack([arm.upper for arm in arms]) + JOINT_SLACK
@@ -46,8 +64,14 @@ def observation_space(
             "tcp_pose": pose_box(len(arms)),
             "gripper_opening": box(0.0, np.array(gripper_width) + 0.01, (len(arms),)),
             "object_pose": pose_box(objects),
-            "goal_pose": pose_box(objects),
+            "goal_pose": pose_box(goals),
             "motion_index": box(0.0, float(motions), (1,)),
+            "obstacle_active": box(0.0, 1.0, (obstacles,)),
+            "obstacle_shape": box(0.0, 3.0, (obstacles,)),
+            "obstacle_size": box(0.0, LARGEST_OBSTACLE, (obstacles, 3)),
+            "obstacle_pose": pose_box(obstacles),
+            "obstacle_velocity": box(-FASTEST_OBSTACLE, FASTEST_OBSTACLE, (obstacles, 3)),
+            **more,
         }
     )
 

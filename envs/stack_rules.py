@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..planner.jit import kernel
-from .boxes import TABLE_HEIGHT
 from .scene import ARM, FINGERS, FIRST_OBJECT, WORLD
 from .state import State
+from .things import TABLE_HEIGHT
 
 BLOCK_SIZE = (0.06, 0.04, 0.05)
 BLOCK = 0.04
@@ -86,7 +86,7 @@ def allowed_contact(low, high, placed):
         return True
     if low == FINGERS:
         return block == placed or block == placed - 1
-    return block - (low - FIRST_OBJECT) == 1
+    return low >= FIRST_OBJECT and block - (low - FIRST_OBJECT) == 1
 
 
 @kernel
@@ -206,8 +206,6 @@ class StackProgress:
             "stage": self._stages[self._best_stage],
             "failure_reason": self.failure,
             "collision": self.collision,
-            "n_contacts": self.collisions,
-            "min_obstacle_distance": math.inf,
             "blocks_placed": self.placed,
             "position_error": self._errors[0],
             "yaw_error": self._errors[1],

@@ -7,18 +7,31 @@ from typing import Any
 import numpy as np
 
 from ..planner.errors import BadOption, UnknownName
-from .base import OneDemoEnv
+from ..planner.pose import Pose
+from ..planner.shapes import Box
+from .base import SLOTS, OneDemoEnv
 from .bodies import robot_body
-from .boxes import TABLE_HEIGHT, Box
-from .layouts import TABLE_EDGE, Layout, level_named, stack_layout
+from .layouts import BASE_GAP, LONG_GAP, RANGES, TABLE_EDGE, Layout, stack_layout
 from .options import checked_joints, checked_poses
+from .placement import Leg, Order
+from .render import Ghost
+from .sim import Start
 from .spaces import observation_space
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress
 from .state import State
 from .task import TaskDescription, TaskObject
+from .things import TABLE_HEIGHT, Solid, Things
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
-OPTIONS = ("level", "object_poses", "base_pose", "joint_positions")
+OPTIONS = ("level", "obstacles", "object_poses", "base_pose", "joint_positions")
+RAISED = 0.10
+"""Height [m] of the hand above a grasp or a place at the ends of a leg."""
+ABOVE = (0.0, 0.04, 0.08)
+"""Heights [m] above grasps and places at which the hand must find room beside obstacles."""
+PAPER_SPEED = 0.1
+"""Of the obstacle that swings in front of the last block [m/s]."""
+DOWN = (0.0, 1.0, 0.0, 0.0)
+"""A hand that points down, fingers closing along world x (wxyz)."""
 
 
 class StackEnv(OneDemoEnv):
@@ -38,7 +51,7 @@ class StackEnv(OneDemoEnv):
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes, below 0 opens, 0 leaves it |
+    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or blocks. Poses are `x y z [m]`, then quaternion wxyz.
@@ -52,6 +65,11 @@ class StackEnv(OneDemoEnv):
     | `object_pose` | (n, 7) | the blocks |
     | `goal_pose` | (n, 7) | where each block must end; constant during an episode |
     | `motion_index` | (1,) | 2k while block k is to be fetched, 2k + 1 while it is held, 2n when all are placed |
+    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
+    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
+    | `obstacle_pose` | (3, 7) | the obstacles |
+    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
 
     ## Rewards
     `reward="dense"`: in [0, 1], the share of the task that is done, with reaching, grasping and carrying of the
@@ -62,19 +80,27 @@ class StackEnv(OneDemoEnv):
     up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
     12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis.
 
+    L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way of the hand, L4 one that
+    swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the forearm passes.
+    R, S and T start as L1 does. Obstacles are solid; they overlap what hand and block sweep on the straight way
+    and leave room at the start, at every grasp and at every place, whatever method is used.
+
     ## Episode End
     `terminated` with a settled success, or when a block has fallen off the table. `truncated` after 60 s for three
     blocks (Gymnasium's `TimeLimit`).
 
     ## Info
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts`, `min_obstacle_distance`, `blocks_placed`, `position_error` (n,) [m], `yaw_error` (n,) [rad].
+    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
+    what it holds), `layouts_refused` (starts that had no room for the obstacles), `blocks_placed`,
+    `position_error` (n,) [m], `yaw_error` (n,) [rad].
 
     ## Arguments
-    `robot="Panda"`, `n_blocks=3` (2 to 6), `level="L1"`, `control_mode="joint_velocity" | "ee_twist"`,
+    `robot="Panda"`, `n_blocks=3` (2 to 6), `level="L1"`, `obstacles=None` (what the level says) or `"none" |
+    "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
     `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
-    `reset(options=...)` takes `level`, `object_poses` (n, 7), `base_pose` (7,) of the lowest block's goal, and
-    `joint_positions` (7,).
+    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `object_poses` (n, 7),
+    `base_pose` (7,) of the lowest block's goal, and `joint_positions` (7,).
 
     ## Version History
     * v0: first version.
@@ -85,6 +111,7 @@ class StackEnv(OneDemoEnv):
         robot: str = "Panda",
         n_blocks: int = 3,
         level: str = "L1",
+        obstacles: str | None = None,
         control_mode: str = "joint_velocity",
         reward: str = "sparse",
         control_frequency: int = 50,
@@ -92,25 +119,26 @@ class StackEnv(OneDemoEnv):
     ):
         if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 2 <= n_blocks <= 6:
             raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 2 to 6")
-        level_named(level)
-        boxes = tuple(Box(f"block{k}", BLOCK_SIZE, TEXTURES[k]) for k in range(n_blocks))
+        blocks = tuple(Solid(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
         super().__init__(
             robot=robot,
-            boxes=boxes,
+            things=Things(blocks),
+            level=level,
+            obstacles=obstacles,
             control_mode=control_mode,
             reward=reward,
             render_mode=render_mode,
             control_frequency=control_frequency,
         )
-        self.level, self.n_blocks = level, n_blocks
+        self.n_blocks = n_blocks
         widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        self.observation_space = observation_space(self.arms, widths, n_blocks, 2 * n_blocks)
+        self.observation_space = observation_space(self.arms, widths, n_blocks, n_blocks, 2 * n_blocks, SLOTS)
         self._task = TaskDescription(
             name="stack",
             robot=robot,
             arms=self.arms,
             control_dt=self.control_dt,
-            objects=tuple(TaskObject(box.name, np.array(box.size), np.pi) for box in boxes),
+            objects=tuple(TaskObject.of(block) for block in blocks),
             bodies=tuple(robot_body(robot, k) for k in range(len(self.arms))),
             table_height=TABLE_HEIGHT,
             fixtures=self.sim.scene.fixtures,
@@ -124,27 +152,50 @@ class StackEnv(OneDemoEnv):
         """What every policy may know beforehand."""
         return self._task
 
-    def _start(self, options: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         for key in options:
             if key not in OPTIONS:
                 raise UnknownName("reset option", key, OPTIONS)
-        level = level_named(options.get("level", self.level))
         home = self.sim.scene.home
         axis = np.array(self.sim.model.body("robot0_base").pos[:2])
-        layout = stack_layout(self.np_random, level, self.n_blocks, axis, home.shape)
-        poses, base = _poses(layout)
+        gap = LONG_GAP if spacious else BASE_GAP
+        drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap)
+        poses, base = _poses(drawn)
         if "object_poses" in options:
             poses = checked_poses("object_poses", options["object_poses"], self.n_blocks)
         if "base_pose" in options:
             base = checked_poses("base_pose", [options["base_pose"]], 1)[0]
         _check_places(poses, base)
-        joints = np.clip(home + layout.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
+        joints = np.clip(home + drawn.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
         if "joint_positions" in options:
             joints = checked_joints(options["joint_positions"], self.arms)
         self._goal_pose = np.repeat(base[None], self.n_blocks, axis=0)
         self._goal_pose[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
         self._progress = StackProgress(self._goal_pose, poses, self.control_dt)
-        return joints, poses
+        return Start(joints, poses)
+
+    def _legs(self, start: Start) -> list[Leg]:
+        """The carries: from above a block to above its place."""
+        return [
+            Leg(
+                start=_above(_grasps(block)[0], RAISED),
+                end=_above(_grasps(goal)[0], RAISED),
+                keys=tuple(
+                    tuple(_above(grasp, up) for grasp in _grasps(pose)) for pose in (block, goal) for up in ABOVE
+                ),
+                shape=Box(BLOCK_SIZE),
+                tcp_from_object=_grasps(block)[0].inverse() @ Pose.from_vector(block),
+                motion=2 * k + 1,
+            )
+            for k, (block, goal) in enumerate(zip(start.objects, self._goal_pose, strict=True))
+        ]
+
+    def _paper(self, legs: list[Leg]) -> list[Order]:
+        """One that swings in front of the last block."""
+        return [Order("moving", len(legs) - 1, PAPER_SPEED)]
+
+    def _ghosts(self) -> list[Ghost]:
+        return [Ghost(pose, Box(BLOCK_SIZE)) for pose in self._goal_pose]
 
     def _goals(self) -> tuple[np.ndarray, float]:
         return self._goal_pose.copy(), self._progress.motion_index
@@ -156,6 +207,17 @@ class StackEnv(OneDemoEnv):
             progress.collision = self.sim.contact_name((verdict.low, verdict.high))
         reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
         return reward, progress.success or verdict.fallen == 1, progress.info()
+
+
+def _grasps(block: np.ndarray) -> list[Pose]:
+    """Hands (tcp) that hold a block (7,) from above by its narrow side, half a turn apart."""
+    pose = Pose.from_vector(block)
+    yaws = (0.5 * np.pi, -0.5 * np.pi)
+    return [pose @ Pose.from_yaw([0, 0, 0], yaw) @ Pose.from_position_quaternion([0, 0, 0], DOWN) for yaw in yaws]
+
+
+def _above(pose: Pose, height: float) -> Pose:
+    return Pose.from_position_quaternion([0, 0, height]) @ pose
 
 
 def _poses(layout: Layout) -> tuple[np.ndarray, np.ndarray]:

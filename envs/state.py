@@ -27,6 +27,7 @@ class State(NamedTuple):
         object_pose: (n_objects, 7) x y z [m] and wxyz with w >= 0.
         object_velocity: (n_objects, 3) [m/s].
         touching: (owners, owners) 1 where two owners touch, the smaller first; renewed in place.
+        bead_position: (n_beads, 3) [m].
     """
 
     joint_positions: np.ndarray
@@ -36,6 +37,7 @@ class State(NamedTuple):
     object_pose: np.ndarray
     object_velocity: np.ndarray
     touching: np.ndarray
+    bead_position: np.ndarray = np.zeros((0, 3))
 
 
 @kernel
@@ -43,7 +45,8 @@ def command(action, full, bound, servos, grips, ctrl):
     """Write an action into `ctrl`; index of its first entry that is not finite, then nothing is written, or -1.
 
     Args:
-        action: (n_arms * (dof + 1),) per arm its joints, then its gripper: above 0 closes, below 0 opens.
+        action: (n_arms * (dof + 1),) per arm its joints, then its gripper: above 0 closes, below 0 opens to that
+            part of the widest gap, 0 leaves it.
         full: (n_arms, dof) joint speeds [rad/s] of an entry 1.
         bound: entries are clipped to plus and minus this.
         servos: (n_arms, dof) places of the joint speeds in `ctrl`.
@@ -60,8 +63,10 @@ def command(action, full, bound, servos, grips, ctrl):
             ctrl[servos[i, j]] = min(max(action[first + j], -bound), bound) * full[i, j]
         grip = action[first + dof]
         if grip != 0.0:
+            part = min(-grip, 1.0) if grip < 0.0 else 0.0
             for finger in range(grips.shape[1]):
-                ctrl[int(grips[i, finger, 0])] = grips[i, finger, 2 if grip > 0.0 else 1]
+                opened, closed = grips[i, finger, 1], grips[i, finger, 2]
+                ctrl[int(grips[i, finger, 0])] = closed + part * (opened - closed)
     return -1
 
 

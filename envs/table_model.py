@@ -1,4 +1,4 @@
-"""The model of a robot at a table with boxes, built with robosuite: the only file that touches it.
+"""The model of a robot at a table with things, built with robosuite: the only file that touches it.
 
 robosuite's own controllers cost six times the physics and track a path badly; here every arm joint is MuJoCo's
 integrated-velocity servo: the control is a joint speed, its integral is held by a stiff position servo against
@@ -8,6 +8,7 @@ gravity-free links.
 from __future__ import annotations
 
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import robosuite
@@ -18,19 +19,20 @@ from robosuite.models.tasks import ManipulationTask
 from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
 from robosuite.utils.mjcf_utils import CustomMaterial
 
-from .boxes import TABLE_HALF_SIZE, TABLE_HEIGHT, Box
+from .model_parts import bead_bodies, furniture_body, glass_body, obstacle_bodies, solid_body
 from .servos import leave_out_unused, use_velocity_servos
+from .things import TABLE_HALF_SIZE, TABLE_HEIGHT, Glass, Solid, Things, half_sizes
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
 FRICTION = (1.0, 0.005, 0.0001)
-"""Of a box: sliding, torsional, rolling."""
+"""Of a wooden block: sliding, torsional, rolling."""
 
 
 class OneDemoTableScene(ManipulationEnv):
-    """Robot, table and boxes; used for its model only."""
+    """Robot, table and things; used for its model only."""
 
-    def __init__(self, robot: str, wanted: tuple[Box, ...]):
-        self.wanted = wanted
+    def __init__(self, robot: str, things: Things):
+        self.things = things
         super().__init__(
             robots=robot,
             controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
@@ -51,8 +53,9 @@ class OneDemoTableScene(ManipulationEnv):
         arena.set_origin([0, 0, 0])
         arena.table_visual.attrib.pop("material", None)
         arena.table_visual.set("rgba", TABLE_COLOR)
-        self.boxes = [_wooden(box) for box in self.wanted]
-        self.model = ManipulationTask(arena, [robot_model], self.boxes)
+        wooden = [_wooden(each) for each in self.things.objects if isinstance(each, Solid) and each.texture]
+        self.model = ManipulationTask(arena, [robot_model], wooden)
+        self.model.worldbody.extend(_other_bodies(self.things))
         use_velocity_servos(self.model.root, set(robot_model.joints))
         leave_out_unused(self.model.root)
 
@@ -61,25 +64,34 @@ class OneDemoTableScene(ManipulationEnv):
         return 0.0
 
 
-def _wooden(box: Box) -> BoxObject:
+def _other_bodies(things: Things) -> list[Element]:
+    """Everything that robosuite's own objects cannot be."""
+    free = [glass_body(each) for each in things.objects if isinstance(each, Glass)]
+    free += [solid_body(each) for each in things.objects if isinstance(each, Solid) and not each.texture]
+    free += [furniture_body(each) for each in things.furniture]
+    beads = bead_bodies(things.beads) if things.beads else []
+    return [*free, *beads, *obstacle_bodies(things.obstacles)]
+
+
+def _wooden(block: Solid) -> BoxObject:
     material = CustomMaterial(
-        texture=box.texture,
-        tex_name=f"{box.name}_texture",
-        mat_name=f"{box.name}_material",
+        texture=block.texture,
+        tex_name=f"{block.name}_texture",
+        mat_name=f"{block.name}_material",
         tex_attrib={"type": "cube"},
         mat_attrib={"texrepeat": "1 1", "specular": "0.2", "shininess": "0.05"},
     )
     return BoxObject(
-        box.name,
-        size=[0.5 * extent for extent in box.size],
-        density=box.density,
+        block.name,
+        size=list(half_sizes(block.shape)[1]),
+        density=block.density,
         friction=FRICTION,
         material=material,
         rng=np.random.default_rng(0),
     )
 
 
-def table_env(robot: str, boxes: tuple[Box, ...]) -> Any:
+def table_env(robot: str, things: Things) -> Any:
     """A robosuite environment with the compiled model of the scene."""
     ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
-    return OneDemoTableScene(robot, boxes)
+    return OneDemoTableScene(robot, things)

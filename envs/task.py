@@ -8,7 +8,9 @@ import numpy as np
 
 from ..planner.arm import Arm
 from ..planner.body import Body
-from ..planner.shapes import Obstacle
+from ..planner.pose import Pose
+from ..planner.shapes import Obstacle, Shape
+from .things import Furniture, Glass, Solid, extents
 
 FAILURES = (
     "ik_or_limit",
@@ -25,27 +27,59 @@ FAILURES = (
 
 @dataclass(frozen=True, slots=True)
 class TaskObject:
-    """A movable box of the scene.
+    """A movable object of the scene.
 
     Attributes:
         name: unique name.
-        size: (3,) full extents [m] along the object's own axes.
-        yaw_symmetry: smallest yaw [rad] after which the object looks the same; 2 pi if it never does.
+        shape: it, or the hull of it, centered on its frame.
+        yaw_symmetry: smallest yaw [rad] after which the object looks the same; 2 pi if it never does, 0 if it is
+            round.
     """
 
     name: str
-    size: np.ndarray
+    shape: Shape
     yaw_symmetry: float
 
-    def __post_init__(self):
-        size = np.array(self.size, dtype=np.float64)
-        size.flags.writeable = False
-        object.__setattr__(self, "size", size)
+    @staticmethod
+    def of(thing: Solid | Glass) -> TaskObject:
+        """What a policy may know of a thing."""
+        return TaskObject(thing.name, thing.shape, thing.yaw_symmetry)
+
+    @property
+    def size(self) -> np.ndarray:
+        """(3,) full extents [m] along the object's own axes."""
+        return extents(self.shape)
 
     @property
     def symmetric_yaws(self) -> tuple[float, ...]:
-        """All yaws [rad] in [0, 2 pi) after which the object looks the same."""
+        """All yaws [rad] in [0, 2 pi) after which the object looks the same; (0,) for a round one, which has no end."""
+        if self.yaw_symmetry == 0.0:
+            return (0.0,)
         return tuple(np.arange(round(2 * np.pi / self.yaw_symmetry)) * self.yaw_symmetry)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFurniture:
+    """What does not move within an episode, but may stand elsewhere in the next.
+
+    Attributes:
+        name: unique name.
+        parts: its solids, in its own frame.
+    """
+
+    name: str
+    parts: tuple[Obstacle, ...]
+
+    @staticmethod
+    def of(thing: Furniture) -> TaskFurniture:
+        """What a policy may know of a thing."""
+        return TaskFurniture(
+            thing.name, tuple(Obstacle(part.shape, part.pose, name=thing.name) for part in thing.parts)
+        )
+
+    def at(self, pose: Pose) -> tuple[Obstacle, ...]:
+        """Its solids in the world."""
+        return tuple(Obstacle(part.shape, pose @ part.pose, name=part.name) for part in self.parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +96,7 @@ class TaskDescription:
         table_height: z of the table top [m].
         fixtures: what stands still for ever: the table (named "table"), the robot's stand; no floor.
         gripper_width: largest distance between the finger pads [m], one per arm.
+        furniture: in the order of `furniture_pose`.
     """
 
     name: str
@@ -73,3 +108,4 @@ class TaskDescription:
     table_height: float
     fixtures: tuple[Obstacle, ...]
     gripper_width: tuple[float, ...]
+    furniture: tuple[TaskFurniture, ...] = ()

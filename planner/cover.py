@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,6 +34,7 @@ FRACTIONS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Where a hull is cut, of its extent."""
 
 
+@lru_cache(maxsize=64)
 def covering_capsules(shape: Shape, excess: float = 0.01) -> Cover:
     """As few capsules as possible that contain a shape and hardly stick out of it.
 

@@ -72,7 +72,7 @@ class Problem(NamedTuple):
 @cache
 def panda() -> tuple[Arm, Body, np.ndarray]:
     """The Panda as it stands at the table: arm, capsules, usual joints."""
-    scene = compiled_scene("Panda", ())
+    scene = compiled_scene("Panda")
     return scene.arms[0].arm, robot_body("Panda"), scene.home[0]
 
 

@@ -18,7 +18,8 @@ LOWER = {
     "bench": {"planner", "envs", "baselines", "configs"},
 }
 ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit", "chain", "screw", "shapes", "body", "body_models"}
-"""The planner's lowest floor."""
+ENVS_MAY_USE |= {"proximity", "ik"}
+"""The planner's lowest floor: geometry and kinematics, no method."""
 PLANNER_ORDER = [
     "errors",
     "jit",
@@ -78,16 +79,22 @@ PLANNER_ORDER = [
     "certify",
 ]
 ENVS_ORDER = [
+    "things",
     "task",
-    "boxes",
     "layouts",
     "options",
     "spaces",
     "state",
     "servos",
+    "model_parts",
     "table_model",
     "scene",
     "bodies",
+    "obstacles",
+    "nearness",
+    "rooms",
+    "placement",
+    "levels",
     "sim",
     "render",
     "base",

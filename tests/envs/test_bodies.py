@@ -23,7 +23,7 @@ def test_the_shipped_table_is_what_is_fitted(robot):
 
 @pytest.mark.parametrize("robot", sorted(ROBOTS))
 def test_the_shipped_capsules_hold_every_corner_of_the_links(robot):
-    scene, body = compiled_scene(robot, ()), robot_body(robot)
+    scene, body = compiled_scene(robot), robot_body(robot)
     model, index = scene.model, scene.arms[0]
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     for _ in range(20):
@@ -69,7 +69,7 @@ def test_robots_without_a_table_are_named():
 
 
 def test_the_static_scene_is_the_table_and_the_stand():
-    things = {thing.name: thing for thing in compiled_scene("Panda", ()).fixtures}
+    things = {thing.name: thing for thing in compiled_scene("Panda").fixtures}
     table = things["table"]
     assert table.shape == Box((0.8, 0.8, 0.05))
     assert table.pose.position[2] + 0.025 == pytest.approx(0.8)

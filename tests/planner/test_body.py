@@ -166,7 +166,7 @@ def test_points_that_make_no_hull_are_refused():
 
 @cache
 def robot() -> tuple[mujoco.MjModel, Arm, Body]:
-    scene = compiled_scene("Panda", ())
+    scene = compiled_scene("Panda")
     arm = scene.arms[0].arm
     return scene.model, arm, body_from_mujoco(scene.model, arm, arm.joint_names)
 

@@ -33,7 +33,7 @@ START = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
 
 
 def robot():
-    return compiled_scene("Panda", ()).arms[0].arm, robot_body("Panda")
+    return compiled_scene("Panda").arms[0].arm, robot_body("Panda")
 
 
 def sideways(way=0.35):

@@ -21,7 +21,7 @@ START = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
 
 
 def planned(obstacles):
-    scene = compiled_scene("Panda", ())
+    scene = compiled_scene("Panda")
     arm, body = scene.arms[0].arm, robot_body("Panda")
     start = arm.fk(START)
     goal = Pose.from_position_quaternion([0.0, 0.35, 0.0]) @ start
@@ -34,7 +34,7 @@ def between(arm, way=0.5):
 
 @pytest.mark.parametrize("things", [0, 1])
 def test_a_timed_plan_keeps_limits_ends_and_distance(things):
-    arm = compiled_scene("Panda", ()).arms[0].arm
+    arm = compiled_scene("Panda").arms[0].arm
     ball = [Obstacle(Sphere(0.04), Pose.from_position_quaternion(between(arm)), name="ball")][:things]
     arm, body, plan = planned(ball)
     assert plan.success and plan.how == ("escape" if things else "direct")
@@ -57,7 +57,7 @@ def test_what_the_spline_runs_into_is_refused():
 
 
 def test_without_a_plan_there_is_nothing_to_time():
-    arm = compiled_scene("Panda", ()).arms[0].arm
+    arm = compiled_scene("Panda").arms[0].arm
     goal = arm.fk(START).position + np.array([0.0, 0.35, 0.0])
     arm, body, plan = planned([Obstacle(Sphere(0.1), Pose.from_position_quaternion(goal))])
     with pytest.raises(PlanFailed, match="goal in collision"):
