@@ -35,7 +35,7 @@ def run(
 ) -> None:
     """Run episodes of a config and write a report, a figure and a video.
 
-    Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, n_blocks, max_seconds,
+    Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
     video, settings. Keys with dots reach into settings: settings.motion.guide=0.2
 
     Finished episodes are kept: running the same config again goes on where it stopped. The last line on

@@ -143,6 +143,7 @@ class StackEnv(OneDemoEnv):
             table_height=TABLE_HEIGHT,
             fixtures=self.sim.scene.fixtures,
             gripper_width=widths,
+            obstacles=SLOTS,
         )
         self._goal_pose = np.zeros((n_blocks, 7))
         self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
