@@ -90,6 +90,29 @@ def perf(
 
 
 @app.command()
+def tasks(
+    write: Annotated[Path | None, typer.Option("--write", help="Write a page for each task into this folder.")] = None,
+    clips: Annotated[bool, typer.Option("--clips", help="With --write: also record a looping clip of each.")] = False,
+) -> None:
+    """List the environments, or write a documentation page for each.
+
+    A page is the environment's docstring: actions, observations, rewards, starts, ends, options.
+
+    Examples:
+    - onedemo tasks
+
+    - onedemo tasks --write docs/tasks --clips
+    """
+    from .task_pages import list_tasks, write_pages
+
+    if write is None:
+        list_tasks()
+        return
+    for file in write_pages(write, clips=clips):
+        console().print(str(file))
+
+
+@app.command()
 def version() -> None:
     """Print the version."""
     from importlib.metadata import version as installed

@@ -92,7 +92,7 @@ def _open_folder(folder: Path, held: ExitStack) -> None:
 def _built(config: RunConfig, source: Path, overrides: list[str], err: Any) -> tuple[Any, Policy]:
     """The environment and the policy, and what is being waited for."""
     with err.status("building the scene and the planner (compiled on first use: about half a minute)"):
-        return _prepared(config, source, overrides)
+        return prepared(config, source, overrides)
 
 
 def _run(env: Any, policy: Policy, config: RunConfig, folder: Path, command: str, err: Any) -> list[str]:
@@ -101,8 +101,13 @@ def _run(env: Any, policy: Policy, config: RunConfig, folder: Path, command: str
     return _report(env, policy, config, folder, records, command, err)
 
 
-def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any, Policy]:
-    """The environment and the policy; what the config names wrongly becomes an error with its key."""
+def prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any, Policy]:
+    """The environment and the policy of a config, compiled and warm.
+
+    Raises:
+        BadConfig: the config names something wrongly; with its key.
+        BadDemonstration: the demonstration is of something else.
+    """
     from ..baselines.factory import make_policy
     from ..baselines.screw_policy import PROGRAMS
     from ..planner import motions, reactive
