@@ -15,8 +15,6 @@ TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Distances [m] to keep from what the task itself brings close: things are put down there."""
 INTRUDERS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
-LAG = 0.05
-"""Seconds by which the arm is behind its commands."""
 MOVED = 1e-3
 """Change of a pose vector's entry from which an object is in another place."""
 
@@ -77,14 +75,12 @@ class Surroundings:
 
 
 def intruders_of(observation: Observation) -> tuple[Obstacle, ...]:
-    """What is in the way, as observed; moving ones where they will be when a command has taken effect."""
+    """What is in the way, as observed."""
     found = []
     for slot in np.flatnonzero(observation["obstacle_active"]):
-        pose = Pose.from_vector(observation["obstacle_pose"][slot])
-        velocity = observation["obstacle_velocity"][slot]
-        ahead = Pose.from_position_quaternion(LAG * velocity) @ pose
+        pose, velocity = Pose.from_vector(observation["obstacle_pose"][slot]), observation["obstacle_velocity"][slot]
         shape = _shape(int(observation["obstacle_shape"][slot]), observation["obstacle_size"][slot])
-        found.append(Obstacle(shape, ahead, velocity, f"obstacle{slot}"))
+        found.append(Obstacle(shape, pose, velocity, f"obstacle{slot}"))
     return tuple(found)
 
 
