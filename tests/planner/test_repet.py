@@ -19,7 +19,7 @@ from onedemo.planner.edges import is_clear, place_tool, point_speeds, slide_is_c
 from onedemo.planner.edges import screw_is_clear as screw_clear
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, OneDemoError
 from onedemo.planner.escape import first_blocked
-from onedemo.planner.escape_tree import AWAY, KEPT, RANDOM, TREE_WIDTH, VERDICT, WIDEST, expand
+from onedemo.planner.escape_tree import AWAY, RANDOM, TREE_WIDTH, VERDICT, WIDEST, expand
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.repet import (
     MAX_OBSTACLES,
