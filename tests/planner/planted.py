@@ -261,13 +261,6 @@ BUGS = [
     ),
     Bug("all bounds are taken to hold", "barrier", "if all_hold(rows, count, x, n):", "if True:", CLOSED),
     Bug(
-        "nearly violated bounds are taken to hold",
-        "qp",
-        "        if value < -TOLERANCE:",
-        "        if value < -1e-3:",
-        CLOSED,
-    ),
-    Bug(
         "guard sends what it has refused",
         "safety",
         "                x[i] *= scale\n            return FREE",
