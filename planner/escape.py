@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from . import screw
-from .edges import is_clear, tool_room
+from .edges import is_clear, longest_way, tool_room
 from .escape_tree import (
     AWAY,
     CANDIDATES,
@@ -34,24 +34,35 @@ FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG = 0, 1
 LEAST_ROOM = 0.005
 """Room [m] that a root and the way back have at least, where an obstacle's own margin fills the shell."""
 
+FAR_AHEAD = 0.5
+"""Room [m] beyond which it does not matter how much there is."""
+
 
 @kernel
 def first_blocked(g, path, count, first, options):
-    """Index of the pose before the first edge that is not clear, from `first` on; -1 if all are."""
+    """Index of the pose before the first edge that is not clear, from `first` on; -1 if all are.
+
+    Where there is room, one look at it proves several edges: none of them can use up more of it than its way.
+    """
+    left = 0.0
     for k in range(first, count - 1):
         x, y = screw.load8(path, k), screw.load8(path, k + 1)
         if options[ON_SHELL] == 1.0 and tool_room(g, y, 1.0) < max(options[SHELL] - options[WIDEST], LEAST_ROOM):
             return k
-        if not is_clear(g, x, y, options[WIDEST]):
+        way = longest_way(g, x, y)
+        if left <= way:
+            left = tool_room(g, x, FAR_AHEAD)
+        if left <= way and not is_clear(g, x, y, options[WIDEST]):
             return k
+        left -= way
     return -1
 
 
 @inner
-def _rooms(g, path, count, rooms):
-    """Room [m] at every pose, up to 1 m."""
+def _rooms(g, path, count, rooms, cutoff):
+    """Room [m] at every pose, up to the cutoff."""
     for k in range(count):
-        rooms[k] = tool_room(g, screw.load8(path, k), 1.0)
+        rooms[k] = tool_room(g, screw.load8(path, k), cutoff)
 
 
 @inner
@@ -207,7 +218,7 @@ def escape(g, path, count, out, rooms, places, poses, branch, tree, cells, heap,
         blocked = first_blocked(g, path, count, certain, options)
         if blocked < 0:
             return (ESCAPED if detour else FREE), count, detour
-        _rooms(g, path, count, rooms)
+        _rooms(g, path, count, rooms, enough)
         root = _root(rooms, blocked, enough)
         size = _candidates(path, rooms, count, blocked, enough, int(options[CANDIDATES]), places, poses)
         row, j, rows = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)

@@ -311,15 +311,18 @@ def plan_batch(
         arm: the arm.
         body: its capsules.
         settings: see `PlanSettings`.
-        workers: threads; the compiled loops let go of the interpreter.
+        workers: threads; the compiled loops let go of the interpreter. Each takes the next problem when it is done
+            with its last: a few hard ones take longer than all others together.
     """
     if not 1 <= workers <= 256:
         raise BadOption("workers", f"{workers} is not from 1 to 256")
 
-    def run(share: Sequence[Problem]) -> list[Plan]:
-        planner = Planner(arm, body, settings)
-        return [planner.plan(p.demonstrated, p.start, p.goal, p.obstacles, seed=p.seed) for p in share]
+    left = iter(enumerate(problems))  # taking the next of it is one step of the interpreter
 
+    def run(planner: Planner) -> dict[int, Plan]:
+        return {k: planner.plan(p.demonstrated, p.start, p.goal, p.obstacles, seed=p.seed) for k, p in left}
+
+    planners = [Planner(arm, body, settings) for _ in range(min(workers, len(problems)))]
     with ThreadPoolExecutor(workers) as pool:
-        shares = list(pool.map(run, [problems[k::workers] for k in range(workers)]))
-    return [shares[k % workers][k // workers] for k in range(len(problems))]
+        found = {k: plan for plans in pool.map(run, planners) for k, plan in plans.items()}
+    return [found[k] for k in range(len(problems))]

@@ -97,7 +97,7 @@ class RepetSettings:
     random: int = 8
     away: float = 1.0
     candidates: int = 5
-    cell: float = 0.5
+    cell: float = 1.0
     nodes: int = 4000
     rounds: int = 10
     shortcut: bool = True

@@ -19,7 +19,14 @@ from numpy.typing import ArrayLike
 from .arm import Arm
 from .barrier import DECAY, HALVINGS, SHELL, clip_to_limits, constrain, exceeds_limits, scale_to_speeds
 from .body import Body
-from .clearance import find_near, least_room, reach_of, room_of_near, step_stays_clear
+from .clearance import (
+    find_near,
+    least_room,
+    placed_step_stays_clear,
+    reach_of,
+    room_of_near,
+    step_stays_clear,
+)
 from .errors import BadOption, BadShape, UnknownName
 from .jit import inner, kernel
 from .robot_work import (
@@ -126,7 +133,9 @@ def _shortened(g, q, x, dt):
         if after > best_room:
             best, best_room = scale, after
         gentle = room <= 0.0 or after >= (1.0 - g[SETTINGS, DECAY]) * room
-        if gentle and step_stays_clear(g, q, step[:n], dt):
+        # the whole step is placed already, its ways are bound: mostly there is no need to look at parts of it
+        whole = k == 0 and placed_step_stays_clear(g, step[:n], 0.0, dt)
+        if gentle and (whole or step_stays_clear(g, q, step[:n], dt)):
             for i in range(n):
                 x[i] *= scale
             return FREE if scale == 1.0 else HELD
