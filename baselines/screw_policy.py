@@ -11,7 +11,7 @@ from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadOption, PlanFailed, UnknownName
 from ..planner.motions import MotionSettings
-from ..planner.planning import PlanSettings
+from ..planner.plans import PlanSettings
 from ..planner.reactive import ReactiveSettings
 from ..planner.repet import RepetSettings
 from ..planner.safety import SafetySettings

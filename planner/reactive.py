@@ -21,7 +21,8 @@ from .body import Body
 from .clearance import room_at, room_of_near
 from .errors import BadOption
 from .guarded import guarded_tick
-from .planning import Planner, PlanSettings
+from .planning import Planner
+from .plans import PlanSettings
 from .pose import METERS_PER_RADIAN, Pose, PosePath
 from .pursuit import ARRIVED, INDEX, WAITED
 from .safety import BLOCKED as UNSAFE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import strategies as st
@@ -183,9 +185,9 @@ def rows_of(path: PosePath, kept: PosePath) -> np.ndarray:
 
 
 def off_the_screws(path: PosePath, rows: np.ndarray) -> float:
-    """Largest distance of any pose of a path to the screw between the kept rows around it, at its part of the length."""
+    """Largest distance of any pose of a path to the screw between the kept rows around it, at its part of the way."""
     lengths, worst = path.lengths(LEVER), 0.0
-    for i, j in zip(rows[:-1], rows[1:], strict=True):
+    for i, j in pairwise(rows):
         part = (lengths[i : j + 1] - lengths[i]) / (lengths[j] - lengths[i])
         distance, angle = dq.gap(path.dqs[i : j + 1], dq.sclerp(path.dqs[i], path.dqs[j], part))
         worst = max(worst, float(np.hypot(distance, LEVER * angle).max()))
