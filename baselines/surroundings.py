@@ -50,10 +50,14 @@ class Surroundings:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
         if moved.any():
             self._poses[:] = poses
-            objects = (
-                Obstacle(Box(tuple(each.size)), Pose.from_vector(pose), name=each.name, margin=self._margin)
-                for k, (each, pose) in enumerate(zip(self._objects, poses, strict=True))
-                if k != self._held
-            )
-            self._seen = (*self._fixed, *objects)
+            self._seen = self.around(observation, self._held)
         return self._seen
+
+    def around(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
+        """The obstacles as observed, if an object were in the hand."""
+        objects = (
+            Obstacle(Box(tuple(each.size)), Pose.from_vector(pose), name=each.name, margin=self._margin)
+            for k, (each, pose) in enumerate(zip(self._objects, observation["object_pose"], strict=True))
+            if k != held
+        )
+        return (*self._fixed, *objects)

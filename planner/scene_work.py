@@ -173,6 +173,17 @@ class SceneWork:
         place_frames(work, WORLD)
         return self._tightest(work, self._layout.tool_names)
 
+    def meets_mover(self) -> bool:
+        """True if an obstacle that moves is among the near pairs of the whole arm that were found last."""
+        near = self._near(self.robot)
+        others = near[near[:, KIND] == 0.0, OTHER].astype(int)
+        return bool(self.robot[OBSTACLES + others, 17:20].any())
+
+    @staticmethod
+    def _near(work: np.ndarray) -> np.ndarray:
+        first = int(work[HEADER, NEAR])
+        return work[first : first + int(work[HEADER, N_NEAR])]
+
     def _tightest(self, work: np.ndarray, names: Sequence[str]) -> Tightest | None:
         margins = work[OBSTACLES : OBSTACLES + int(work[HEADER, N_OBSTACLES]), MARGIN]
         find_near(work, max([work[SETTINGS, SELF_MARGIN], *margins]))
@@ -181,8 +192,7 @@ class SceneWork:
     def tightest_seen(self, work: np.ndarray | None = None, names: Sequence[str] = ()) -> Tightest | None:
         """The same of the near pairs that were found last; None if there were none."""
         work, names = (self.robot, self._layout.names) if work is None else (work, names)
-        first = int(work[HEADER, NEAR])
-        near = work[first : first + int(work[HEADER, N_NEAR])]
+        near = self._near(work)
         if not len(near):
             return None
         row = near[np.argmin(near[:, GAP] - near[:, KEEP])]

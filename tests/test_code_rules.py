@@ -65,6 +65,8 @@ PLANNER_ORDER = [
     "leg",
     "plans",
     "planning",
+    "command",
+    "foresight",
     "reactive",
     "segment",
     "demo",
