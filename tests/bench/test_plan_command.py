@@ -95,7 +95,7 @@ def test_the_lines_tell_what_was_found(capsys):
 def test_a_reason_names_part_and_obstacle(capsys):
     assert run_plan("sphere", ["goal=[0.0, 0.0, 0.83, 0, 1, 0, 0]"], None, None) == NOT_FOUND
     out = capsys.readouterr().out
-    assert "sphere: goal in collision: fingers touches table; in" in out
+    assert "not found   sphere: goal in collision: hand touches ball; in" in out
 
 
 @pytest.mark.parametrize("smooth, timed", [(True, False), (False, True), (True, True)])
