@@ -47,27 +47,35 @@ class Surroundings:
 
     def seen(self, observation: Observation) -> tuple[Obstacle, ...]:
         """The obstacles as observed; the same tuple while nothing has moved."""
-        poses = observation["object_pose"]
-        if self._task.furniture:
-            poses = np.concatenate([poses, observation["furniture_pose"]])
+        poses = self._places(observation)
         moved = np.abs(poses - self._poses).max(axis=1) > MOVED
         if self._held is not None:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
         intruders = np.column_stack([observation[key].reshape(len(self._intruders), -1) for key in INTRUDERS])
         if moved.any():
             self._poses[:] = poses
-            self._things = self._renewed(poses)
+            self._things = self._standing(poses, self._held)
         if moved.any() or (intruders != self._intruders).any():
             self._intruders = intruders
             self._seen = (*self._things, *intruders_of(observation))
         return self._seen
 
-    def _renewed(self, poses: np.ndarray) -> tuple[Obstacle, ...]:
+    def around(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
+        """The obstacles as observed, if an object were in the hand."""
+        return (*self._standing(self._places(observation), held), *intruders_of(observation))
+
+    def _places(self, observation: Observation) -> np.ndarray:
+        """Poses (n, 7) of all objects and furniture."""
+        if not self._task.furniture:
+            return observation["object_pose"]
+        return np.concatenate([observation["object_pose"], observation["furniture_pose"]])
+
+    def _standing(self, poses: np.ndarray, held: int | None) -> tuple[Obstacle, ...]:
         objects, furniture, margin = self._task.objects, self._task.furniture, self._margin
         around = [
             Obstacle(each.shape, Pose.from_vector(pose), name=each.name, margin=margin)
             for k, (each, pose) in enumerate(zip(objects, poses, strict=False))
-            if k != self._held
+            if k != held
         ]
         for each, pose in zip(furniture, poses[len(objects) :], strict=True):
             around += [replace(part, margin=margin) for part in each.at(Pose.from_vector(pose))]

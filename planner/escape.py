@@ -14,6 +14,7 @@ from .escape_tree import (
     AWAY,
     CANDIDATES,
     GROW,
+    MOST,
     ON_SHELL,
     PARENT,
     RANDOM,
@@ -29,8 +30,8 @@ from .escape_tree import (
 )
 from .jit import inner, kernel
 
-FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG = 0, 1, 2, 3, 4, 5
-"""The path was clear; detours were found; why not."""
+FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
+"""The path was clear; detours were found; why not. NODE_LIMIT: a tree was stopped while it still had leaves."""
 LEAST_ROOM = 0.005
 """Room [m] that a root and the way back have at least, where an obstacle's own margin fills the shell."""
 
@@ -171,9 +172,9 @@ def _joined(path, count, root, branch, size, back, out, spacing):
 
 @inner
 def _grown(g, root, candidates, tree, cells, heap, options, state):
-    """Grow trees at changing scales until one gets home: (row, candidate, rows of the last tree)."""
+    """Grow trees at changing scales until one gets home: (row, candidate, rows of the last, True if one was full)."""
     random, away = options[RANDOM], options[AWAY]
-    row, j, count = -1, -1, 0
+    row, j, count, full = -1, -1, 0, False
     for attempt in range(int(options[RETRIES]) + 1):
         scale = 1.0
         if attempt > 0:
@@ -182,8 +183,15 @@ def _grown(g, root, candidates, tree, cells, heap, options, state):
         row, j, count = grow(g, root, candidates, tree, cells, heap, options, scale * options[STEP], state)
         if row >= 0:
             break
+        full |= count >= min(len(tree), int(options[MOST]))
     options[RANDOM], options[AWAY] = random, away
-    return row, j, count
+    return row, j, count, full
+
+
+@kernel
+def last_tree(status, detours, most):
+    """Row of the log of `escape` that tells of the tree left behind: that of the failed detour, if one failed."""
+    return detours - 1 if status == ESCAPED else min(detours, most - 1)
 
 
 @kernel
@@ -221,10 +229,10 @@ def escape(g, path, count, out, rooms, places, poses, branch, tree, cells, heap,
         _rooms(g, path, count, rooms, enough)
         root = _root(rooms, blocked, enough)
         size = _candidates(path, rooms, count, blocked, enough, int(options[CANDIDATES]), places, poses)
-        row, j, rows = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
+        row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
         log[detour, 0] = rows
         if row < 0:
-            return NO_ESCAPE, count, detour
+            return (NODE_LIMIT if full else NO_ESCAPE), count, detour
         length = _branch(tree, row, branch)
         screw.store8(branch, length, screw.load8(poses, j))
         length += 1

@@ -49,7 +49,13 @@ from .robot_work import (
 from .shapes import Obstacle, pack
 
 FREE, CHANGED, HELD, BLOCKED = 0, 1, 2, 3
-"""The command is as it was; it was changed; it was shortened by the guard; what must hold cannot hold."""
+"""The command is as it was; it was changed; it was shortened by the guard; what must hold cannot hold.
+
+BLOCKED says to the caller: the command is the best there is, but no promise of distance goes with it. Among obstacles
+that stand still it comes too where a cornered robot has less room than the buffer (0.8 % of adversarial steps): the
+bounds ask for a retreat that there is none of, the guard's step, mostly none at all, is still proven clear, and to go
+on commanding is safe. Where something moves, it comes closer than it may: stop what brings it, if you can.
+"""
 
 
 @dataclass(frozen=True, slots=True)
