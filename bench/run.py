@@ -106,7 +106,7 @@ def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[An
 
     from .. import envs  # noqa: F401  (registers the ids)
     from ..baselines.factory import make_policy
-    from ..planner import motions, reactive
+    from ..planner import reactive
     from ..planner.demo_io import load_demonstration
 
     _check_names(config, source, overrides)
@@ -125,7 +125,6 @@ def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[An
         )
     task = env.unwrapped.task
     for arm, body in zip(task.arms, task.bodies, strict=True):
-        motions.warm_up(arm)
         reactive.warm_up(arm, body)
     return env, make_policy(config.method, task, demonstration, config.settings)
 
