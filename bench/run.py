@@ -110,7 +110,7 @@ def prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any
     """
     from ..baselines.factory import make_policy
     from ..baselines.screw_policy import PROGRAMS
-    from ..planner import motions, reactive
+    from ..planner import reactive
     from ..planner.demo_io import load_demonstration
 
     _check_names(config, source, overrides)
@@ -120,7 +120,6 @@ def prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any
     env: Any = _made(config, source)
     task = env.unwrapped.task
     for arm, body in zip(task.arms, task.bodies, strict=True):
-        motions.warm_up(arm)
         reactive.warm_up(arm, body)
     return env, make_policy(config.method, task, demonstration, config.settings)
 
