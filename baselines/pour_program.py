@@ -116,6 +116,9 @@ def _rim(target: Pose, size: Size) -> Pose:
 class PourProgram:
     """The program of one episode; iterate over `actions()`."""
 
+    SEGMENTS = ("carry",)
+    """What a demonstration of this task must have; "approach" too where the source is not in the hand from the start."""
+
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.settings, self.hand = task, settings, hand
         self.shown = {s.name: resampled(shown.segment_path(s.name), settings.resample) for s in shown.segments}
