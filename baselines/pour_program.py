@@ -45,6 +45,9 @@ CHANCES = 3
 """How often another way is looked for where the carry is blocked."""
 
 
+Contacts = tuple[tuple[str, str], ...]
+
+
 class Way(NamedTuple):
     """Motions as planned, one after the other.
 
@@ -87,6 +90,11 @@ class PourProgram:
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.shown.items()]
         self.source, self.target = (each.name for each in task.objects)
         self._plan = settings.reactive.plan
+        self._standing: Contacts = (("held", task.furniture[SOURCE].name),)
+        self._wanted: tuple[Contacts, Contacts] = (
+            (("fingers", self.source), ("hand", self.source)),
+            (("held", self.target),),
+        )
 
     def actions(self) -> Iterator[np.ndarray]:
         """Fetch the source if it is not in the hand, lift it, pour, and turn it upright again."""
@@ -97,7 +105,7 @@ class PourProgram:
             yield from self._fetch()
         grasped, shape = self._held(), self.task.objects[SOURCE].shape
         hand.hold(SOURCE, shape, grasped)
-        hand.allow([("held", self.task.furniture[SOURCE].name)])
+        hand.allow(self._standing)
         yield from hand.follow(self._lift(hand.arm.fk(hand.q)), loosely=True)
         # the source slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held()
@@ -113,10 +121,11 @@ class PourProgram:
         return self.hand.measured_tcp.inverse() @ self.hand.object_pose(SOURCE)
 
     def _fetch(self) -> Iterator[np.ndarray]:
-        self.hand.allow([("fingers", self.source), ("hand", self.source)])
-        way = self._chosen_fetch()
-        self.paths.append(LabeledPath("final", f"fetch {self.source}", way.paths[0]))
-        yield from self.hand.follow(way.paths[0])
+        before, after, *_ = self._chosen_fetch().paths
+        self.paths.append(LabeledPath("final", f"fetch {self.source}", before.joined(after)))
+        yield from self.hand.follow(before, loosely=True)
+        self.hand.allow(self._wanted[SOURCE])
+        yield from self.hand.follow(after)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(CLOSE, self.settings.close)
 
@@ -131,14 +140,14 @@ class PourProgram:
         """Carry, then tilt; another way is looked for where one turns out to be blocked."""
         failed: list[float] = []
         while True:
-            way, turn = self._chosen_carry(self.hand.q, held, failed)
+            way, turn = self._chosen_carry(self.hand.q, held, failed, thoroughly=True)
             carry, tilt = way.paths
             self.paths.append(LabeledPath("final", "carry and pour", carry.joined(tilt)))
             self.hand.allow(())
             try:
                 yield from self.hand.follow(carry, loosely=True)
                 # near the target, the source may come as near to it as was shown
-                self.hand.allow([("held", self.target)])
+                self.hand.allow(self._wanted[TARGET])
                 yield from self.hand.follow(tilt)
                 return
             except PlanFailed:
@@ -156,24 +165,24 @@ class PourProgram:
     def _body(self, held: Pose) -> Body:
         return self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.hand.arm)
 
-    def _around(self, *, holding: bool) -> list[Obstacle]:
-        """What stands around; what moves is left to the moment."""
+    def _around(self, body: Body) -> list[Obstacle]:
+        """What stands around an arm; what moves is left to the moment."""
         seen = self.hand.surroundings.seen(self.hand.observation)
         still = [each for each in seen if not np.any(each.velocity)]
-        return [each for each in still if not (holding and each.name == self.source)]
+        return [each for each in still if not (body.held and each.name == self.source)]
 
-    def _close_from(self, path: PosePath, body: Body) -> int:
-        """Index of the pose from which on the source stays near the target."""
-        target = pack([Obstacle(self.task.objects[TARGET].shape, self.hand.object_pose(TARGET))])
+    def _near(self, index: int, path: PosePath, body: Body) -> int:
+        """Index of the pose from which on the hand, or what it holds, stays near a glass."""
+        glass = pack([Obstacle(self.task.objects[index].shape, self.hand.object_pose(index))])
         tool = body.tool(self.hand.arm)
-        rooms = np.array([tool_room(tool, row[None], target) for row in path.dqs])
+        rooms = np.array([tool_room(tool, row[None], glass) for row in path.dqs])
         far = np.flatnonzero(rooms > NEAR)
         return max(1, int(far[-1])) if len(far) else 1
 
-    def _planned(self, planner: Planner, path: PosePath, q: np.ndarray, goal: Pose, allowed, holding: bool) -> Way:
-        """A motion to a goal, round what is around."""
-        plan = planner.plan(path, q, goal, self._around(holding=holding), allowed=allowed)
-        followed = imitated_path(path, goal) if plan.how == "joint search" or not plan.success else plan.path
+    def _planned(self, planner: Planner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
+        """A motion to the end of a path, round what is around."""
+        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=allowed)
+        followed = path if plan.how == "joint search" or not plan.success else plan.path
         rank = 0 if not plan.success else 2 if plan.how == "direct" else 1
         reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"
         return Way((followed,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason)
@@ -183,49 +192,58 @@ class PourProgram:
         hand, best, held = self.hand, None, self.goals.held
         empty = Planner(hand.arm, self.task.bodies[0], self._plan)
         full = Planner(hand.arm, self._body(held), replace(self._plan, search=None))
-        touching = [("fingers", self.source), ("hand", self.source)]
-        on_stand = [("held", self.task.furniture[SOURCE].name)]
         for turn in TURNS:
             goal = self.goals.grasp(hand.object_pose(SOURCE), turn)
-            way = self._planned(empty, self.shown["approach"], hand.q, goal, touching, False)
+            way = self._in_two(empty, imitated_path(self.shown["approach"], goal), hand.q, SOURCE)
             if way.rank:
-                lift = self._lift(goal)
-                way = way.then(self._planned(full, lift, way.q, lift[-1], on_stand, True))
+                way = way.then(self._planned(full, self._lift(goal), way.q, self._standing))
             if way.rank:
-                way = way.then(self._chosen_carry(way.q, held, [])[0])
+                way = way.then(self._chosen_carry(way.q, held, [], thoroughly=False)[0])
             if best is None or (len(way.paths), way.order) > (len(best.paths), best.order):
                 best = way
             if best.rank and best.margin >= MARGIN:
                 break
         assert best is not None
-        if len(best.paths) == 1 and not best.rank:
+        if len(best.paths) == 2 and not best.rank:
             raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
         return best
 
-    def _chosen_carry(self, q: np.ndarray, held: Pose, failed: list[float]) -> tuple[Way, float]:
-        """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn."""
+    def _chosen_carry(
+        self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool
+    ) -> tuple[Way, float]:
+        """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
+
+        Args:
+            q: (dof,) joints at the start.
+            held: `tcp_from_source`.
+            failed: turns that were tried in vain.
+            thoroughly: also look for ways through joint space.
+        """
         body = self._body(held)
         quick = Planner(self.hand.arm, body, replace(self._plan, search=None))
         tries = []
         for turn in TURNS:
             if turn not in failed:
-                tries.append((self._carried(quick, body, q, held, turn), turn))
+                tries.append((self._carried(quick, q, held, turn), turn))
                 if tries[-1][0].rank == 2 and tries[-1][0].margin >= MARGIN:
                     return tries[-1]
         best = max(tries, key=lambda each: each[0].order)
-        if best[0].rank == 0:
+        if best[0].rank == 0 and thoroughly:
             thorough = Planner(self.hand.arm, body, self._plan)
-            tries = [(self._carried(thorough, body, q, held, turn), turn) for _, turn in tries[:CHANCES]]
+            tries = [(self._carried(thorough, q, held, turn), turn) for _, turn in tries[:CHANCES]]
             best = max(tries, key=lambda each: each[0].order)
         return best
 
-    def _carried(self, planner: Planner, body: Body, q: np.ndarray, held: Pose, turn: float) -> Way:
+    def _carried(self, planner: Planner, q: np.ndarray, held: Pose, turn: float) -> Way:
         """The carry and the tilting of one turn."""
         goal = self.goals.pouring(self.hand.object_pose(TARGET), held, turn)
-        path = imitated_path(self.shown["carry"], goal)
-        split = self._close_from(path, body)
-        carry, tilt = path[: split + 1], path[split:]
-        way = self._planned(planner, carry, q, carry[-1], [], True)
+        return self._in_two(planner, imitated_path(self.shown["carry"], goal), q, TARGET)
+
+    def _in_two(self, planner: Planner, path: PosePath, q: np.ndarray, glass: int) -> Way:
+        """A path that ends near a glass, which may be touched only by what comes near it on purpose."""
+        split = self._near(glass, path, planner.body)
+        before, after = path[: split + 1], path[split:]
+        way = self._planned(planner, before, q, ())
         if way.rank == 0:
-            return way._replace(paths=(carry, tilt))
-        return way.then(self._planned(planner, tilt, way.q, goal, [("held", self.target)], True))
+            return way._replace(paths=(before, after))
+        return way.then(self._planned(planner, after, way.q, self._wanted[glass]))

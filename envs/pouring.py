@@ -239,19 +239,18 @@ class PourEnv(OneDemoEnv):
     def _legs(self, start: Start) -> list[Leg]:
         """The carry: from above the source's stand to before the target, turned with the arm."""
         glass, rim, center = GLASSES[SOURCE], self._goal_pose[0, :3], start.objects[SOURCE, :3]
-        hand = grasp(glass, center, self._yaw_at(center))
-        yaw = self._yaw_at(rim)
+        hand = grasp(glass, center, self._yaw_at(center, SOURCE))
+        yaw = self._yaw_at(rim, TARGET)
         above = [Pose.from_position_quaternion([0.0, 0.0, up]) @ hand for up in (*ABOVE, RAISED)]
         before, after = pouring(glass, rim, yaw, 0.0, BACK, UP), pouring(glass, rim, yaw, TILTED)
         keys = tuple((pose,) for pose in (*above[:-1], before, after))
         return [Leg(above[-1], before, keys, glass.shape, tcp_from_glass(glass), motion=1)]
 
-    def _yaw_at(self, place: np.ndarray) -> float:
-        """Direction [rad] of a level hand at a place (2 or 3,): the ready hand's, turned with the arm about its base."""
-        x, y = place[:2] - self._axis
-        source = self._nominal[SOURCE, :2] - self._axis
+    def _yaw_at(self, place: np.ndarray, glass: int) -> float:
+        """Direction [rad] of a level hand: the ready one's, turned about the arm's base as the glass's place is."""
         approach = self.arms[0].fk(self._ready[0]).rotation[:2, 2]
-        turned = np.arctan2(y, x) - np.arctan2(source[1], source[0])
+        was, now = self._nominal[glass, :2] - self._axis, place[:2] - self._axis
+        turned = np.arctan2(now[1], now[0]) - np.arctan2(was[1], was[0])
         return float(np.arctan2(approach[1], approach[0]) + turned)
 
     def _goals(self) -> tuple[np.ndarray, float]:
