@@ -6,6 +6,7 @@ import gymnasium as gym
 
 IDS = {
     "onedemo/Stack-v0": ("onedemo.envs.stacking:StackEnv", 3000),
+    "onedemo/Shelve-v0": ("onedemo.envs.shelving:ShelveEnv", 4500),
 }
 """Id: entry point and time limit in control steps."""
 

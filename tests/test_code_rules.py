@@ -100,6 +100,11 @@ ENVS_ORDER = [
     "base",
     "stack_rules",
     "stacking",
+    "shelf_parts",
+    "shelf_layouts",
+    "shelf_options",
+    "shelve_rules",
+    "shelving",
     "registration",
     "__init__",
 ]
