@@ -18,7 +18,7 @@ CUPBOARD = (-0.009, 0.116)
 """Nominal middle of the cupboard's front [m]."""
 WALL_GAP, FRONT_GAP = 0.002, 0.012
 """Least distances of the clutter [m]."""
-N_BOOKS = 3
+MOST_BOOKS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ RANGES = {
         0.04, 0.05, 0.025, np.deg2rad(10.0), 0.01, np.deg2rad(5.0), 0.015, 0.003, np.deg2rad(2.0), 0.006, 0.05
     ),
     "L2": Ranges(
-        0.08, 0.10, 0.05, np.deg2rad(20.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10
+        0.08, 0.10, 0.05, np.deg2rad(15.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10
     ),
 }
 """By the name of a layout, see `levels`."""
@@ -71,8 +71,8 @@ class ShelfLayout:
     Attributes:
         stand: the stand; x along the way in which a book is taken.
         cupboard: the cupboard.
-        slots: shift of the slots along the shelf [m].
-        books: (N_BOOKS, 3) x, y [m] and yaw [rad] of each book on the stand, from its nominal place there.
+        slots: shift of the middle of the slots along the shelf [m].
+        books: (n, 3) x, y [m] and yaw [rad] of each book on the stand, from its nominal place there.
         clutter: (n, 2) gaps of the clutter, see `clutter_poses`.
         joints: (n_arms, dof) offsets from the start joints [rad].
     """
@@ -90,7 +90,8 @@ class ShelfLayout:
 
     def objects(self) -> np.ndarray:
         """(n, 7) all books at the start: the first on the stand, the others in the pile, the last at its bottom."""
-        poses = [self.handed(0), *(waiting(N_BOOKS - 1 - k) for k in range(1, N_BOOKS))]
+        count = len(self.books)
+        poses = [self.handed(0), *(waiting(count - 1 - k) for k in range(1, count))]
         poses += [self.cupboard @ pose for pose in clutter_poses(self.clutter)]
         return np.array([pose.vector for pose in poses])
 
@@ -101,13 +102,14 @@ class ShelfLayout:
         return np.array([self.cupboard.vector, self.stand.vector, foot.vector])
 
     def goals(self, shelf: str) -> np.ndarray:
-        """(N_BOOKS, 7) where the books must end."""
-        along = self.slots + PITCH * (np.arange(N_BOOKS) - 1)
+        """(n, 7) where the books must end."""
+        count = len(self.books)
+        along = self.slots + PITCH * (np.arange(count) - 0.5 * (count - 1))
         return np.array([(self.cupboard @ slot(shelf, each)).vector for each in along])
 
 
-def shelf_layout(rng: np.random.Generator, ranges: Ranges, joints: tuple[int, ...]) -> ShelfLayout:
-    """A layout drawn from its ranges; `joints` is the shape (n_arms, dof) of the start joints."""
+def shelf_layout(rng: np.random.Generator, ranges: Ranges, count: int, joints: tuple[int, ...]) -> ShelfLayout:
+    """A layout of `count` books, drawn from its ranges; `joints` is the shape (n_arms, dof) of the start joints."""
     both = np.array([-1.0, 1.0])
     x, y = STAND[:2] + rng.uniform(*(both * ranges.stand), 2)
     z = STAND[2] + rng.uniform(-ranges.lower, ranges.higher)
@@ -119,7 +121,7 @@ def shelf_layout(rng: np.random.Generator, ranges: Ranges, joints: tuple[int, ..
         stand=Pose.from_yaw([x, y, z], yaw),
         cupboard=Pose.from_yaw([*front, TABLE_HEIGHT], turned),
         slots=float(rng.uniform(*(both * ranges.slots))),
-        books=rng.uniform(-limits, limits, (N_BOOKS, 3)),
+        books=rng.uniform(-limits, limits, (count, 3)),
         clutter=np.array([WALL_GAP, FRONT_GAP]) + rng.uniform(0.0, ranges.clutter, (len(CLUTTER), 2)),
         joints=rng.uniform(-ranges.joints, ranges.joints, joints),
     )

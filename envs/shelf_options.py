@@ -67,7 +67,7 @@ def _check_room(layout: ShelfLayout) -> None:
     """Clutter and slots are in the cupboard and beside each other."""
     if (layout.clutter < 0.0).any():
         raise BadOption("clutter", f"gap {layout.clutter.min():.4g} m is negative: inside the wall or before the front")
-    reach = PITCH + 0.5 * BOOK_SIZE[1]
+    reach = 0.5 * (PITCH * (len(layout.books) - 1) + BOOK_SIZE[1])
     for shelf in SHELVES:
         for side, sign in (("left", 1.0), ("right", -1.0)):
             rows = [k for k, each in enumerate(CLUTTER) if each[:2] == (shelf, side)]

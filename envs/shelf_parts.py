@@ -43,9 +43,9 @@ CLUTTER = (
 """Books that stand there already: shelf, side, size [m] and color, from the side's wall inwards."""
 
 
-def books() -> tuple[Book, ...]:
-    """The three to shelve, then the clutter."""
-    wanted = [Book(f"book{k}", BOOK_SIZE, color) for k, color in enumerate(COLORS)]
+def books(count: int) -> tuple[Book, ...]:
+    """Those to shelve, then the clutter."""
+    wanted = [Book(f"book{k}", BOOK_SIZE, color) for k, color in enumerate(COLORS[:count])]
     return (*wanted, *(Book(f"clutter{k}", size, color) for k, (*_, size, color) in enumerate(CLUTTER)))
 
 

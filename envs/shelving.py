@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import UnknownName
+from ..planner.errors import BadOption, UnknownName
 from ..planner.pose import Pose
 from ..planner.shapes import Box, Obstacle, pack
 from .base import SLOTS, Observation, OneDemoEnv, checked_choice
@@ -15,7 +15,7 @@ from .options import checked_joints
 from .placement import Leg, Order
 from .render import Ghost, View
 from .rooms import arm_room
-from .shelf_layouts import N_BOOKS, RANGES, ShelfLayout, shelf_layout
+from .shelf_layouts import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
 from .shelf_options import OPTIONS, given_layout
 from .shelf_parts import BOOK_SIZE, SHELVES, books, cupboard, stand
 from .shelve_rules import ShelveProgress
@@ -75,10 +75,10 @@ class ShelveEnv(OneDemoEnv):
     | `joint_velocities` | (1, 7) | [rad/s] |
     | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
     | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (8, 7) | the three books, then the clutter; a book's x points away from its spine, z along it |
-    | `goal_pose` | (3, 7) | where each book must end; constant during an episode |
+    | `object_pose` | (n + 5, 7) | the books, then the clutter; a book's x points away from its spine, z along it |
+    | `goal_pose` | (n, 7) | where each book must end; constant during an episode |
     | `furniture_pose` | (3, 7) | cupboard, stand and the stand's foot; constant during an episode |
-    | `motion_index` | (1,) | 2k while book k is to be fetched, 2k + 1 while it is held, 6 when all are shelved |
+    | `motion_index` | (1,) | 2k while book k is to be fetched, 2k + 1 while it is held, 2n when all are shelved |
     | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
     | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
@@ -92,7 +92,7 @@ class ShelveEnv(OneDemoEnv):
     ## Starting State
     By `level`: L0 the nominal places; L1 the stand moved by up to 4 cm, 5 cm lower to 2.5 cm higher, turned by up to
     10 degrees, the cupboard by up to 1 cm and 5 degrees, the slots by up to 15 mm along the shelf, books by up to
-    3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 20
+    3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 15
     degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. These ranges are what the Panda reaches.
 
     L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way from stand to cupboard,
@@ -108,12 +108,12 @@ class ShelveEnv(OneDemoEnv):
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
     `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
     what it holds), `layouts_refused` (starts that had no room for the obstacles), `books_placed`,
-    `position_error` (3,) [m], `angle_error` (3,) [rad], `clutter_pushed_over`.
+    `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
 
     ## Arguments
-    `robot="Panda"`, `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`,
+    `robot="Panda"`, `n_books=3` (1 to 3), `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`,
     `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" |
-    "paper"` (two of different size appear while the second and the third book are placed),
+    "paper"` (two of different size appear while the last two books are carried),
     `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`, `control_frequency=50`,
     `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of
     `Intruder`), `stand_pose` (7,), `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `clutter` (5, 2: gaps
@@ -126,6 +126,7 @@ class ShelveEnv(OneDemoEnv):
     def __init__(
         self,
         robot: str = "Panda",
+        n_books: int = 3,
         shelf: str = "upper",
         level: str = "L1",
         obstacles: str | None = None,
@@ -134,8 +135,10 @@ class ShelveEnv(OneDemoEnv):
         control_frequency: int = 50,
         render_mode: str | None = None,
     ):
-        self.shelf = checked_choice("shelf", shelf, tuple(SHELVES))
-        objects, furniture = books(), (cupboard(), *stand())
+        if isinstance(n_books, bool) or not isinstance(n_books, int) or not 1 <= n_books <= MOST_BOOKS:
+            raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
+        self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
+        objects, furniture = books(n_books), (cupboard(), *stand())
         super().__init__(
             robot=robot,
             things=Things(objects, furniture),
@@ -148,7 +151,7 @@ class ShelveEnv(OneDemoEnv):
             view=VIEW,
         )
         widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        counts = (len(objects), N_BOOKS, 2 * N_BOOKS, SLOTS)
+        counts = (len(objects), n_books, 2 * n_books, SLOTS)
         self.observation_space = observation_space(self.arms, widths, *counts, furniture_pose=pose_box(len(furniture)))
         self._task = TaskDescription(
             name="shelve",
@@ -164,7 +167,7 @@ class ShelveEnv(OneDemoEnv):
         )
         home = self.sim.scene.home
         self._ready = np.array([READY[robot]]) if robot in READY else home
-        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], home.shape)
+        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], n_books, home.shape)
         self._take_layout(self._drawn)
 
     @property
@@ -181,7 +184,7 @@ class ShelveEnv(OneDemoEnv):
         for key in options:
             if key not in OPTIONS:
                 raise UnknownName("reset option", key, OPTIONS)
-        drawn = shelf_layout(self.np_random, RANGES[layout], self._ready.shape)
+        drawn = shelf_layout(self.np_random, RANGES[layout], self.n_books, self._ready.shape)
         drawn = given_layout(drawn, options)
         joints = np.clip(self._ready + drawn.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
         if "joint_positions" in options:
@@ -193,7 +196,7 @@ class ShelveEnv(OneDemoEnv):
         """Act for one control step; afterwards the next book is handed over, if it is time."""
         reached = super().step(action)
         k = self._handed
-        if k < N_BOOKS and self._progress.placed >= k and self._is_clear(self._drawn.handed(k), reached[0]):
+        if k < self.n_books and self._progress.placed >= k and self._is_clear(self._drawn.handed(k), reached[0]):
             pose = self._drawn.handed(k).vector
             self.sim.put(k, pose)
             self._progress.handed_over(k, pose)
@@ -220,8 +223,9 @@ class ShelveEnv(OneDemoEnv):
         return legs
 
     def _paper(self, legs: list[Leg]) -> list[Order]:
-        """One appears while the second book is carried, another one, of another size, with the third."""
-        return [Order("appear", 1 + k, size) for k, size in enumerate(PAPER_SIZES)]
+        """One appears while the last but one book is carried, another one, of another size, with the last."""
+        last = len(legs) - 1
+        return [Order("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose]
