@@ -17,6 +17,7 @@ from ..planner.repet import RepetSettings
 from ..planner.safety import SafetySettings
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
+from .shelve_program import ShelveProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
 
@@ -64,13 +65,14 @@ class ScrewSettings:
         return ReactiveSettings(plan=plan, patience=self.motion.pursuit.patience)
 
 
-PROGRAMS = {"stack": StackProgram}
+Program = StackProgram | ShelveProgram
+PROGRAMS = {"stack": StackProgram, "shelve": ShelveProgram}
 
 
 class Episode:
     """What the policy remembers of an episode: the hand, the running program and how it ended."""
 
-    def __init__(self, hand: Hand, program: StackProgram):
+    def __init__(self, hand: Hand, program: Program):
         self.hand, self.program = hand, program
         self.actions: Iterator[np.ndarray] | None = program.actions()
         self.ended = PolicyReport()

@@ -74,7 +74,7 @@ def turn(a, b):
 
 
 @kernel
-def allowed_contact(low, high, placed, n):
+def allowed_contact(low, high, placed, handed, n):
     """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
 
     Wanted are books on and in furniture, books that wait on the table and on each other, clutter beside clutter,
@@ -84,6 +84,7 @@ def allowed_contact(low, high, placed, n):
         low: smaller owner.
         high: other owner.
         placed: books in their slots.
+        handed: books that were handed over; the ones after them wait.
         n: books to shelve; the objects after them are clutter.
     """
     if low == high or (low == ARM and high == FINGERS):
@@ -94,15 +95,15 @@ def allowed_contact(low, high, placed, n):
     if low == FURNITURE:
         return True
     if low == WORLD:
-        return book > placed and book < n
+        return handed <= book < n
     if low == FINGERS:
         return book < n and (book == placed or book == placed - 1)
     other = low - FIRST_OBJECT
-    return other >= 0 and ((other > placed and book < n) or other >= n)
+    return other >= 0 and (handed <= other < book < n or other >= n)
 
 
 @kernel
-def judged(poses, velocities, tcp, touching, goals, start, lifted, errors):
+def judged(poses, velocities, tcp, touching, goals, start, handed, lifted, errors):
     """Judge a state: the entries of a `Verdict`.
 
     Args:
@@ -112,6 +113,7 @@ def judged(poses, velocities, tcp, touching, goals, start, lifted, errors):
         touching: (owners, owners) who touches whom, see `State`.
         goals: (n, 7) the slots of the books.
         start: (m, 7) where everything was; of a book where it was handed over.
+        handed: number of books that were handed over.
         lifted: (n,) 1 once a book was lifted; renewed.
         errors: (2, n) result: distance [m] and angle [rad] of each book to its slot.
     """
@@ -138,7 +140,7 @@ def judged(poses, velocities, tcp, touching, goals, start, lifted, errors):
     unwanted, low, high = 0, -1, -1
     for a in range(len(touching)):
         for b in range(a, len(touching)):
-            if touching[a, b] != 0.0 and not allowed_contact(a, b, placed, n):
+            if touching[a, b] != 0.0 and not allowed_contact(a, b, placed, handed, n):
                 unwanted, low, high = unwanted + 1, a, b
     done = placed == n and quiet and not toppled
     flags = (int(held), int(raised), int(done), int(lost), int(fallen), int(toppled))
@@ -176,6 +178,7 @@ class ShelveProgress:
         self._best_stage = 0
         self._stages = [stage_name(best, self.n_books) for best in range(2 * self.n_books + 1)]
         self.placed = 0
+        self.handed = 1
         self.held = False
         self.toppled = False
         self.collisions = 0
@@ -192,16 +195,17 @@ class ShelveProgress:
         """All books have been in their slots, at rest and let go for long enough, and no clutter was pushed over."""
         return self._settled_steps >= self._needed
 
-    def handed_over(self, k: int, pose: np.ndarray) -> None:
-        """Book k now lies at a pose (7,) on the stand."""
-        self._start[k] = pose
+    def hand_over(self, pose: np.ndarray) -> None:
+        """The next book now lies at a pose (7,) on the stand."""
+        self._start[self.handed] = pose
+        self.handed += 1
 
     def update(self, state: State) -> Verdict:
         """Take in a new state."""
         self._errors = np.empty((2, self.n_books))
         poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
-        numbers = judged(poses, moving, tcp, state.touching, self._goals, self._start, self._lifted, self._errors)
-        verdict = Verdict(*numbers)
+        known = (self._goals, self._start, self.handed, self._lifted, self._errors)
+        verdict = Verdict(*judged(poses, moving, tcp, state.touching, *known))
         self.placed, self.held, self.toppled = verdict.placed, verdict.held == 1, verdict.toppled == 1
         self._settled_steps = self._settled_steps + 1 if verdict.settled else 0
         self._best_stage = max(self._best_stage, 2 * verdict.placed + verdict.raised)

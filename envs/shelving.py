@@ -177,7 +177,7 @@ class ShelveEnv(OneDemoEnv):
 
     def _take_layout(self, drawn: ShelfLayout) -> None:
         self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
-        self._furniture, self._handed = drawn.furniture(), 1
+        self._furniture = drawn.furniture()
         self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
@@ -195,12 +195,11 @@ class ShelveEnv(OneDemoEnv):
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step; afterwards the next book is handed over, if it is time."""
         reached = super().step(action)
-        k = self._handed
+        k = self._progress.handed
         if k < self.n_books and self._progress.placed >= k and self._is_clear(self._drawn.handed(k), reached[0]):
             pose = self._drawn.handed(k).vector
             self.sim.put(k, pose)
-            self._progress.handed_over(k, pose)
-            self._handed += 1
+            self._progress.hand_over(pose)
         return reached
 
     def _is_clear(self, place: Pose, observation: Observation) -> bool:
