@@ -143,6 +143,7 @@ class StackEnv(OneDemoEnv):
             table_height=TABLE_HEIGHT,
             fixtures=self.sim.scene.fixtures,
             gripper_width=widths,
+            obstacles=SLOTS,
         )
         self._goal_pose = np.zeros((n_blocks, 7))
         self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
@@ -158,7 +159,7 @@ class StackEnv(OneDemoEnv):
                 raise UnknownName("reset option", key, OPTIONS)
         home = self.sim.scene.home
         axis = np.array(self.sim.model.body("robot0_base").pos[:2])
-        gap = LONG_GAP if spacious else BASE_GAP
+        gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
         drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap)
         poses, base = _poses(drawn)
         if "object_poses" in options:
