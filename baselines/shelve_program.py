@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from .screw_policy import ScrewSettings
 
 CUPBOARD, STAND = "cupboard", "stand"
-MOTIONS = ("approach", "reach", "lift", "carry", "insert", "retreat")
 LOST = 0.03
 """Distance [m] of a book from where it should be in the hand beyond which it was dropped."""
 PATIENCE = 5.0
@@ -36,9 +35,12 @@ PATIENCE = 5.0
 class ShelveProgram:
     """The program of one episode; iterate over `actions()`."""
 
+    SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")
+    """What a demonstration of this task must have."""
+
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
-        self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in MOTIONS}
+        self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
         self._release = _gripper_after(shown, "insert")
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 

@@ -164,6 +164,7 @@ class ShelveEnv(OneDemoEnv):
             fixtures=self.sim.scene.fixtures,
             gripper_width=widths,
             furniture=tuple(TaskFurniture.of(each) for each in furniture),
+            obstacles=SLOTS,
         )
         home = self.sim.scene.home
         self._ready = np.array([READY[robot]]) if robot in READY else home

@@ -27,6 +27,7 @@ class Start(NamedTuple):
         furniture: (n_furniture, 7) world poses.
         beads: (n_beads, 3) places [m].
         intruders: the obstacles.
+        grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing round something; nan: it is open.
     """
 
     joints: np.ndarray
@@ -34,6 +35,7 @@ class Start(NamedTuple):
     furniture: np.ndarray = np.zeros((0, 7))
     beads: np.ndarray = np.zeros((0, 3))
     intruders: tuple[Intruder, ...] = ()
+    grips: np.ndarray | None = None
 
 
 class Simulation:
@@ -64,13 +66,16 @@ class Simulation:
         self._no_beads = np.zeros((0, 3))
 
     def reset(self, start: Start) -> None:
-        """Put everything in place, at rest, with open grippers."""
+        """Put everything in place, at rest, with open grippers where none holds something."""
         mujoco.mj_resetData(self.model, self.data)
-        for arm, q in zip(self.scene.arms, start.joints, strict=True):
+        grips = np.full(len(self.scene.arms), np.nan) if start.grips is None else start.grips
+        for arm, q, gap, widest in zip(self.scene.arms, start.joints, grips, self._widest, strict=True):
             self.data.qpos[arm.qpos] = q
             self.data.act[arm.act] = q
-            self.data.ctrl[arm.grip] = arm.opened
-            self.data.qpos[arm.finger_qpos] = arm.opened
+            closing = np.isfinite(gap)
+            inwards = 0.5 * (widest - gap) * np.sign(arm.closed - arm.opened) if closing else 0.0
+            self.data.ctrl[arm.grip] = arm.closed if closing else arm.opened
+            self.data.qpos[arm.finger_qpos] = arm.opened + inwards
         for address, pose in zip(self._object_places, start.objects, strict=True):
             self.data.qpos[address : address + 7] = pose
         if len(start.furniture):

@@ -89,6 +89,7 @@ ENVS_ORDER = [
     "model_parts",
     "table_model",
     "scene",
+    "beads",
     "bodies",
     "obstacles",
     "nearness",
@@ -105,6 +106,10 @@ ENVS_ORDER = [
     "shelf_options",
     "shelve_rules",
     "shelving",
+    "pour_geometry",
+    "pour_layouts",
+    "pour_rules",
+    "pouring",
     "registration",
     "__init__",
 ]
