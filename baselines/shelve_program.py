@@ -54,8 +54,13 @@ class ShelveProgram:
             yield from self._retreat()
 
     def _awaited(self, k: int) -> Iterator[np.ndarray]:
-        """Stand still with an open hand until book k lies on the stand."""
+        """Open the hand, and rise out of the way until book k lies on the stand: nobody reaches under an arm."""
         yield from self.hand.grip(OPEN, self.settings.open)
+        out_of_the_way = () if self._on_stand(k) else self.hand.follow(self._from_here("lift"), loosely=True)
+        for action in out_of_the_way:
+            yield action
+            if self._on_stand(k):
+                return
         left = round(PATIENCE / self.task.control_dt)
         while not self._on_stand(k):
             if left == 0:

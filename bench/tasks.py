@@ -37,4 +37,5 @@ class TaskFacts:
 
 TASKS = {
     "stack": TaskFacts("onedemo/Stack-v0", Error("position_error", "largest position error", "mm", 1e3)),
+    "shelve": TaskFacts("onedemo/Shelve-v0", Error("position_error", "largest position error", "mm", 1e3)),
 }

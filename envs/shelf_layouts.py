@@ -57,9 +57,7 @@ RANGES = {
     "L1": Ranges(
         0.04, 0.05, 0.025, np.deg2rad(10.0), 0.01, np.deg2rad(5.0), 0.015, 0.003, np.deg2rad(2.0), 0.006, 0.05
     ),
-    "L2": Ranges(
-        0.08, 0.10, 0.05, np.deg2rad(15.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10
-    ),
+    "L2": Ranges(0.08, 0.10, 0.05, np.deg2rad(15.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10),
 }
 """By the name of a layout, see `levels`."""
 
@@ -110,17 +108,16 @@ class ShelfLayout:
 
 def shelf_layout(rng: np.random.Generator, ranges: Ranges, count: int, joints: tuple[int, ...]) -> ShelfLayout:
     """A layout of `count` books, drawn from its ranges; `joints` is the shape (n_arms, dof) of the start joints."""
-    both = np.array([-1.0, 1.0])
-    x, y = STAND[:2] + rng.uniform(*(both * ranges.stand), 2)
+    x, y = STAND[:2] + rng.uniform(-ranges.stand, ranges.stand, 2)
     z = STAND[2] + rng.uniform(-ranges.lower, ranges.higher)
-    yaw = STAND_YAW + rng.uniform(*(both * ranges.stand_yaw))
-    front = CUPBOARD + rng.uniform(*(both * ranges.cupboard), 2)
-    turned = CUPBOARD_YAW + rng.uniform(*(both * ranges.cupboard_yaw))
+    yaw = STAND_YAW + rng.uniform(-ranges.stand_yaw, ranges.stand_yaw)
+    front = CUPBOARD + rng.uniform(-ranges.cupboard, ranges.cupboard, 2)
+    turned = CUPBOARD_YAW + rng.uniform(-ranges.cupboard_yaw, ranges.cupboard_yaw)
     limits = np.array([ranges.book, ranges.book, ranges.book_yaw])
     return ShelfLayout(
         stand=Pose.from_yaw([x, y, z], yaw),
         cupboard=Pose.from_yaw([*front, TABLE_HEIGHT], turned),
-        slots=float(rng.uniform(*(both * ranges.slots))),
+        slots=rng.uniform(-ranges.slots, ranges.slots),
         books=rng.uniform(-limits, limits, (count, 3)),
         clutter=np.array([WALL_GAP, FRONT_GAP]) + rng.uniform(0.0, ranges.clutter, (len(CLUTTER), 2)),
         joints=rng.uniform(-ranges.joints, ranges.joints, joints),

@@ -111,8 +111,8 @@ class ShelveEnv(OneDemoEnv):
     `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
 
     ## Arguments
-    `robot="Panda"`, `n_books=3` (1 to 3), `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`,
-    `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" |
+    `robot="Panda"`, `n_books=3` (1 to 3), `shelf="upper" | "lower"` (the demonstration was given in the lower one),
+    `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" |
     "paper"` (two of different size appear while the last two books are carried),
     `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`, `control_frequency=50`,
     `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of
