@@ -32,6 +32,9 @@ LIFT, WAY_IN = 0.15, 0.22
 """Heights above the stand and way before the slot at the ends of a carry [m]."""
 GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
 """Hand (tcp) in the frame of a book that it holds by the spine, 25 mm deep, fingers on its covers."""
+SPREAD = 0.15
+"""Of obstacles about the hand's way [m]: a book and the hand behind it sweep far more than the way itself, which is
+so short that what lies right on it would be in the way of the hand before the slot, too."""
 CLEAR = 0.10
 """The robot is at least this far from the stand while a book is put there [m]."""
 PAPER_SIZES = (0.06, 0.09)
@@ -112,8 +115,8 @@ class ShelveEnv(OneDemoEnv):
 
     ## Arguments
     `robot="Panda"`, `n_books=3` (1 to 3), `shelf="upper" | "lower"` (the demonstration was given in the lower one),
-    `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" |
-    "paper"` (two of different size appear while the last two books are carried),
+    `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
+    "forearm" | "paper"` (two of different size appear while the last two books are carried),
     `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`, `control_frequency=50`,
     `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of
     `Intruder`), `stand_pose` (7,), `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `clutter` (5, 2: gaps
@@ -219,7 +222,8 @@ class ShelveEnv(OneDemoEnv):
             up = Pose.from_position_quaternion([0.0, 0.0, LIFT])
             back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
             keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
-            legs.append(Leg(up @ grasp, back[0], keys, Box(BOOK_SIZE), GRASP.inverse(), motion=2 * k + 1))
+            held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
+            legs.append(Leg(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD))
         return legs
 
     def _paper(self, legs: list[Leg]) -> list[Order]:
