@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from ..planner.arm import Arm
 from ..planner.body import Body
+from ..planner.command import DONE, FAILED, ReactiveSettings
 from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
-from ..planner.reactive import DONE, FAILED, ReactivePlanner, ReactiveSettings
+from ..planner.reactive import ReactivePlanner
 from ..planner.shapes import Shape
+from .choice import Choice, Leg, choose, way_out
 from .policy import Observation
 from .surroundings import Surroundings
 
@@ -27,6 +29,7 @@ class Hand:
 
     Attributes:
         q: (dof,) commanded joints.
+        empty: the body with nothing in the hand.
         observation: the latest; the policy renews it before each tick.
     """
 
@@ -42,7 +45,7 @@ class Hand:
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
         self.observation, self.surroundings = observation, surroundings
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
-        self._gripper, self._empty = OPEN, body
+        self._gripper, self.empty = OPEN, body
         self._planner = ReactivePlanner(arm, body, settings)
 
     @property
@@ -61,30 +64,52 @@ class Hand:
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
         """From now on object `index` is part of the arm, and no longer around it."""
         self.surroundings.without(index)
-        self._planner.hold(self._empty.holding("held", shape, tcp_from_object, self.arm))
+        self._planner.hold(self.body_with(shape, tcp_from_object))
+
+    def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
+        """The body with an object in the hand, as "held"."""
+        return self.empty.holding("held", shape, tcp_from_object, self.arm)
 
     def release(self) -> None:
         """From now on the hand is empty."""
         self.surroundings.without(None)
-        self._planner.hold(self._empty)
+        self._planner.hold(self.empty)
 
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
         """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
         self.surroundings.allowed = tuple(contacts)
 
-    def follow(self, path: PosePath, *, loosely: bool = False) -> Actions:
+    def choose(self, leg: Leg, then: Callable[[int], Leg] | None = None) -> Choice:
+        """The best goal of a leg from here; see `choice.choose`."""
+        return choose(self.arm, self._planner.settings.plan, self.q, leg, then)
+
+    def way_out(self, leg: Leg) -> PosePath | None:
+        """How a leg leaves from here; see `choice.way_out`."""
+        return way_out(self.arm, self._planner.settings.plan, self.q, leg)
+
+    def go(self, choice: Choice) -> Actions:
+        """Do what was chosen."""
+        for path, loosely in choice.parts:
+            yield from self.follow(path, loosely=loosely, onward=choice.onward)
+
+    def follow(self, path: PosePath, *, loosely: bool = False, onward: PosePath | None = None) -> Actions:
         """Follow a path to its end, round what is in the way.
+
+        Args:
+            path: of the tcp.
+            loosely: until it is within reach of the end.
+            onward: the path that comes next: where there is a choice, it ends in a posture that suits it.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience.
         """
-        self._planner.go(path, loosely=loosely)
+        self._planner.go(path, loosely=loosely, onward=onward)
         while True:
             command = self._planned()
             if command.state == DONE:
                 return
             if command.state == FAILED:
-                raise PlanFailed(command.reason, self._stall_detail())
+                raise PlanFailed(command.reason, command.detail or self._stall_detail())
             yield self._action(command.velocity)
 
     def wait(self, seconds: float) -> Actions:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..envs.task import TaskDescription
+from ..planner.command import ReactiveSettings
 from ..planner.demo import Demonstration
 from ..planner.errors import BadOption, PlanFailed, UnknownName
 from ..planner.motions import MotionSettings
-from ..planner.planning import PlanSettings
-from ..planner.reactive import ReactiveSettings
+from ..planner.plans import PlanSettings
 from ..planner.repet import RepetSettings
 from ..planner.safety import SafetySettings
 from .hand import Hand

@@ -14,9 +14,9 @@ import numpy as np
 from ..envs.task import TaskDescription, TaskObject
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
-from ..planner.motions import Motion, plan_motion, reachable_departure
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
+from .choice import Choice, Leg
 from .hand import CLOSE, OPEN, Hand
 from .policy import LabeledPath
 from .surroundings import TABLE
@@ -69,7 +69,10 @@ class StackProgram:
         for k in range(len(self.task.objects)):
             yield from self._fetch(k)
             yield from self._place(k)
-        yield from self.hand.follow(self._way_out(self.withdrawal), loosely=True)
+        last = len(self.task.objects) - 1
+        away = self.hand.way_out(self._leg(last, self.approach, (), leaving=self.withdrawal))
+        if away is not None:
+            yield from self.hand.follow(away, loosely=True)
 
     def _wanted(self, k: int) -> tuple[tuple[str, str], ...]:
         """Contacts that belong to moving object k: of fingers with it and with what it stands on, of it with that."""
@@ -80,11 +83,9 @@ class StackProgram:
 
     def _fetch(self, k: int) -> Iterator[np.ndarray]:
         self.hand.allow(self._wanted(k))
-        motion = self._chosen_fetch(k)
-        self.paths.append(LabeledPath("final", f"fetch {self.task.objects[k].name}", motion.final_path))
-        if motion.departure is not None:
-            yield from self.hand.follow(motion.departure, loosely=True)
-        yield from self.hand.follow(motion.tail)
+        choice = self._chosen_fetch(k)
+        self.paths.append(LabeledPath("final", f"fetch {self.task.objects[k].name}", choice.path))
+        yield from self.hand.go(choice)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(CLOSE, self.settings.close)
 
@@ -92,47 +93,51 @@ class StackProgram:
         target = self.task.objects[k]
         grasped = self._held(k)
         self.hand.hold(k, target.shape, grasped)
-        lift = self._way_out(self.transfer)
-        yield from self.hand.follow(lift, loosely=True)
+        lift = self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
+        if lift is not None:
+            yield from self.hand.follow(lift, loosely=True)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held(k)
         if held.gap(grasped)[0] > LOST:
             raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
-        motion = _best(self._placements(self.hand.q, k, held, leaving=None), target.name)
-        self.paths.append(LabeledPath("final", f"place {target.name}", lift.joined(motion.final_path)))
-        yield from self.hand.follow(motion.tail)
+        choice = self.hand.choose(self._placement(k, held))
+        path = choice.path if lift is None else lift.joined(choice.path)
+        self.paths.append(LabeledPath("final", f"place {target.name}", path))
+        yield from self.hand.go(choice)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(OPEN, self.settings.open)
         self.hand.release()
-
-    def _way_out(self, leaving: PosePath) -> PosePath:
-        return reachable_departure(self.hand.arm, self.hand.q, leaving, self.settings.motion)[0]
 
     def _held(self, k: int) -> Pose:
         """`tcp_from_object` as observed."""
         return self.hand.measured_tcp.inverse() @ self.hand.object_pose(k)
 
-    def _chosen_fetch(self, k: int) -> Motion:
-        """The grasp from which the object can also be placed, by kinematic roll-outs of both motions."""
+    def _chosen_fetch(self, k: int) -> Choice:
+        """The grasp from which the object can also be placed."""
         target, hand = self.task.objects[k], self.hand
-        candidates = []
-        for grasp in grasps(self.shown, target):
-            goal = hand.object_pose(k) @ grasp
-            leaving = self.withdrawal if k else None
-            fetch = plan_motion(hand.arm, hand.q, self.approach, goal, self.settings.motion, leaving=leaving)
-            for place in self._placements(fetch.q, k, grasp.inverse(), leaving=self.transfer):
-                order = (fetch.arrives, place.arrives, min(fetch.margin, place.margin))
-                candidates.append((order, len(candidates), fetch))
-        return _best([max(candidates)[2]], target.name)
+        ways = grasps(self.shown, target)
+        goals = tuple(hand.object_pose(k) @ grasp for grasp in ways)
+        leg = self._leg(k, self.approach, goals, leaving=self.withdrawal if k else None)
+        return hand.choose(leg, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
 
-    def _placements(self, q: np.ndarray, k: int, held: Pose, leaving: PosePath | None) -> list[Motion]:
-        goals = releases(self.task.objects[k], self.hand.goal_pose(k), held, self.settings.release_height)
-        arm, settings = self.hand.arm, self.settings.motion
-        return [plan_motion(arm, q, self.transfer, goal, settings, leaving=leaving) for goal in goals]
+    def _placement(self, k: int, held: Pose, leaving: PosePath | None = None) -> Leg:
+        """Object k from the hand to its goal."""
+        target = self.task.objects[k]
+        goals = releases(target, self.hand.goal_pose(k), held, self.settings.release_height)
+        return self._leg(k, self.transfer, tuple(goals), held=held, leaving=leaving)
 
-
-def _best(motions: list[Motion], name: str) -> Motion:
-    chosen = max(motions, key=lambda motion: (motion.arrives, motion.margin))
-    if not chosen.arrives:
-        raise PlanFailed(chosen.reason, f"no symmetric goal of {name} can be reached along the demonstration")
-    return chosen
+    def _leg(
+        self,
+        k: int,
+        demonstrated: PosePath,
+        goals: tuple[Pose, ...],
+        *,
+        held: Pose | None = None,
+        leaving: PosePath | None = None,
+    ) -> Leg:
+        hand, target = self.hand, self.task.objects[k]
+        body = hand.empty if held is None else hand.body_with(target.shape, held)
+        around = hand.surroundings.around(hand.observation, None if held is None else k)
+        wanted = [pair for pair in self._wanted(k) if pair[1] in [obstacle.name for obstacle in around]]
+        allowed = tuple(pair for pair in wanted if pair[0] in body.names)
+        return Leg(target.name, demonstrated, goals, body, around, allowed, leaving)

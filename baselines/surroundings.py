@@ -15,8 +15,6 @@ TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Distances [m] to keep from what the task itself brings close: things are put down there."""
 INTRUDERS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
-LAG = 0.05
-"""Seconds by which the arm is behind its commands."""
 MOVED = 1e-3
 """Change of a pose vector's entry from which an object is in another place."""
 
@@ -49,27 +47,35 @@ class Surroundings:
 
     def seen(self, observation: Observation) -> tuple[Obstacle, ...]:
         """The obstacles as observed; the same tuple while nothing has moved."""
-        poses = observation["object_pose"]
-        if self._task.furniture:
-            poses = np.concatenate([poses, observation["furniture_pose"]])
+        poses = self._places(observation)
         moved = np.abs(poses - self._poses).max(axis=1) > MOVED
         if self._held is not None:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
         intruders = np.column_stack([observation[key].reshape(len(self._intruders), -1) for key in INTRUDERS])
         if moved.any():
             self._poses[:] = poses
-            self._things = self._renewed(poses)
+            self._things = self._standing(poses, self._held)
         if moved.any() or (intruders != self._intruders).any():
             self._intruders = intruders
             self._seen = (*self._things, *intruders_of(observation))
         return self._seen
 
-    def _renewed(self, poses: np.ndarray) -> tuple[Obstacle, ...]:
+    def around(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
+        """The obstacles as observed, if an object were in the hand."""
+        return (*self._standing(self._places(observation), held), *intruders_of(observation))
+
+    def _places(self, observation: Observation) -> np.ndarray:
+        """Poses (n, 7) of all objects and furniture."""
+        if not self._task.furniture:
+            return observation["object_pose"]
+        return np.concatenate([observation["object_pose"], observation["furniture_pose"]])
+
+    def _standing(self, poses: np.ndarray, held: int | None) -> tuple[Obstacle, ...]:
         objects, furniture, margin = self._task.objects, self._task.furniture, self._margin
         around = [
             Obstacle(each.shape, Pose.from_vector(pose), name=each.name, margin=margin)
             for k, (each, pose) in enumerate(zip(objects, poses, strict=False))
-            if k != self._held
+            if k != held
         ]
         for each, pose in zip(furniture, poses[len(objects) :], strict=True):
             around += [replace(part, margin=margin) for part in each.at(Pose.from_vector(pose))]
@@ -77,14 +83,12 @@ class Surroundings:
 
 
 def intruders_of(observation: Observation) -> tuple[Obstacle, ...]:
-    """What is in the way, as observed; moving ones where they will be when a command has taken effect."""
+    """What is in the way, as observed."""
     found = []
     for slot in np.flatnonzero(observation["obstacle_active"]):
-        pose = Pose.from_vector(observation["obstacle_pose"][slot])
-        velocity = observation["obstacle_velocity"][slot]
-        ahead = Pose.from_position_quaternion(LAG * velocity) @ pose
+        pose, velocity = Pose.from_vector(observation["obstacle_pose"][slot]), observation["obstacle_velocity"][slot]
         shape = _shape(int(observation["obstacle_shape"][slot]), observation["obstacle_size"][slot])
-        found.append(Obstacle(shape, ahead, velocity, f"obstacle{slot}"))
+        found.append(Obstacle(shape, pose, velocity, f"obstacle{slot}"))
     return tuple(found)
 
 

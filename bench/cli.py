@@ -58,18 +58,21 @@ def plan(
     figure: Annotated[Path | None, typer.Option("--figure", help="Draw it: .png, .pdf or .svg.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the plan as JSON for the judge.")] = None,
     certify: Annotated[bool, typer.Option(help="Let the independent judge look at the plan.")] = True,
+    smooth: Annotated[bool, typer.Option("--smooth", help="Lead it along a smooth curve (C1), still clear.")] = False,
+    timed: Annotated[bool, typer.Option("--timed", help="As fast as speed and acceleration limits allow.")] = False,
 ) -> None:
     """Plan one motion round obstacles, without a simulator, and draw it.
 
     Keys of a scene: title, robot, demonstration, start, goal, obstacles, held, allowed, settings, seed. Shipped
-    scenes: free, sphere, wall_gap, shelf, clutter, cage. The exit code is 1 where no plan was found, which is said
-    with the reason, 2 for a scene that cannot be used, and 3 for a plan that the judge refuses.
+    scenes: free, sphere, wall_gap, shelf, clutter, cage. The exit code is 1 where no plan was found, or it does not
+    stay clear when made smooth or timed, which is said with the reason, 2 for a scene that cannot be used, and 3 for
+    a plan that the judge refuses.
 
     Example: onedemo plan wall_gap --figure gap.png
     """
     from .plan_command import run_plan
 
-    raise typer.Exit(run_plan(scene, overrides or [], figure, output, judged=certify))
+    raise typer.Exit(run_plan(scene, overrides or [], figure, output, judged=certify, smooth=smooth, timed=timed))
 
 
 @app.command()

@@ -15,7 +15,8 @@ from ..planner.arm import Arm
 from ..planner.edges import tool_work
 from ..planner.guarded import safe_tick
 from ..planner.jit import kernel
-from ..planner.planning import Planner, PlanSettings, Problem, plan_batch
+from ..planner.planning import Planner, plan_batch
+from ..planner.plans import PlanSettings, Problem
 from ..planner.pose import Pose, PosePath
 from ..planner.repet import RepetSettings, escape_path, point_tool
 from ..planner.robot_work import WORLD, place_capsules, robot_work

@@ -13,9 +13,10 @@ from ..configs.scene_schema import UrdfRobot
 from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.certify import Certificate, certify
-from ..planner.errors import BadConfig, BadShape, OneDemoError, UnknownName
+from ..planner.errors import BadConfig, BadShape, OneDemoError, PlanFailed, UnknownName
 from ..planner.motion_log import MotionLog, write_log
-from ..planner.planning import Plan, Planner, PlanSettings
+from ..planner.planning import Planner
+from ..planner.plans import ACCELERATION, Plan, PlanSettings
 from ..planner.pose import Pose, PosePath
 from ..planner.safety import contact_masks
 from ..planner.scene_work import SceneWork
@@ -64,7 +65,16 @@ class Planned(NamedTuple):
         )
 
 
-def run_plan(scene: str, overrides: list[str], figure: Path | None, output: Path | None, *, judged: bool = True) -> int:
+def run_plan(
+    scene: str,
+    overrides: list[str],
+    figure: Path | None,
+    output: Path | None,
+    *,
+    judged: bool = True,
+    smooth: bool = False,
+    timed: bool = False,
+) -> int:
     """Plan in a scene, print what came of it and write what is wanted; returns the exit code.
 
     Args:
@@ -73,6 +83,8 @@ def run_plan(scene: str, overrides: list[str], figure: Path | None, output: Path
         figure: a picture to write; the ending tells the kind.
         output: the plan as a log that `planner.certify` reads.
         judged: whether the independent judge looks at the plan.
+        smooth: whether the plan is led along a C1 curve, see `Plan.smoothed`.
+        timed: whether it is timed under limits, see `Plan.timed`.
 
     Raises:
         BadConfig: the scene, an override or a file to write cannot be used.
@@ -82,7 +94,7 @@ def run_plan(scene: str, overrides: list[str], figure: Path | None, output: Path
     loaded = load_scene(scene_path(scene), overrides)
     err = console(stderr=True)
     with err.status("building the arm and the planner (compiled on first use: about a minute)"):
-        planned = plan_in(loaded)
+        planned = refined(plan_in(loaded), smooth=smooth, timed=timed)
     certificate = certify(planned.log) if judged and planned.plan.success else None
     out = console()
     for label, style, text in _lines(planned, certificate):
@@ -140,6 +152,19 @@ def plan_in(scene: Scene) -> Planned:
     return Planned(scene, arm, body, start, settings, plan)
 
 
+def refined(planned: Planned, *, smooth: bool, timed: bool) -> Planned:
+    """The plan made smooth, then timed, as is wanted; no plan where that does not stay clear."""
+    plan = planned.plan
+    if not plan.success:
+        return planned
+    try:
+        plan = plan.smoothed() if smooth else plan
+        plan = plan.timed() if timed else plan
+    except PlanFailed as failure:
+        plan = plan.refused(failure)
+    return planned._replace(plan=plan)
+
+
 def _robot(scene: Scene) -> tuple[Arm, Body, np.ndarray]:
     """Arm, body and usual joints of the scene's robot."""
     robot = scene.config.robot
@@ -190,7 +215,7 @@ def _lines(planned: Planned, certificate: Certificate | None) -> Iterator[tuple[
     plan, name = planned.plan, planned.scene.name
     spent = f"in {_time(plan.seconds)}, {plan.tries} {'try' if plan.tries == 1 else 'tries'}"
     if not plan.success:
-        yield "not found ", "red", f"{name}: {plan.reason}, {spent}"
+        yield "not found ", "red", f"{name}: {plan.why}; {spent}"
         if plan.tree is not None:
             kept = int((plan.tree.verdicts == 0).sum())
             yield "looked at ", "", f"{len(plan.tree.poses)} nodes in the last escape tree, {kept} of them kept"
@@ -198,8 +223,7 @@ def _lines(planned: Planned, certificate: Certificate | None) -> Iterator[tuple[
     seconds = plan.dt * (len(plan.joints) - 1)
     yield "found     ", "green", f"{name}: {_how(plan)}, {spent}; the motion takes {seconds:.1f} s"
     yield "clearance ", "", _clearance(planned, certificate)
-    share = plan.changed / max(len(plan.joints) - 1, 1)
-    yield "joints    ", "", f"{plan.margin:.2f} rad from a limit at the least; safety layer at work in {share:.0%}"
+    yield "joints    ", "", f"{plan.margin:.2f} rad from a limit at the least; {_pace(planned)}"
     if certificate is None:
         yield "not judged", "yellow", "see --certify"
     elif certificate.ok:
@@ -213,7 +237,16 @@ def _lines(planned: Planned, certificate: Certificate | None) -> Iterator[tuple[
 
 def _how(plan: Plan) -> str:
     ways = {"direct": "as demonstrated, no detour", "joint search": "by a search in joint space"}
-    return ways.get(plan.how, f"{plan.detours} {'detour' if plan.detours == 1 else 'detours'} by escape trees")
+    found = ways.get(plan.how, f"{plan.detours} {'detour' if plan.detours == 1 else 'detours'} by escape trees")
+    return ", ".join((found, *plan.refined))
+
+
+def _pace(planned: Planned) -> str:
+    plan = planned.plan
+    if "timed" in plan.refined:
+        speeds = np.abs(np.diff(plan.joints, axis=0)) / plan.dt / planned.arm.velocity_limits
+        return f"{speeds.max(initial=0.0):.0%} of the speed limits and up to {ACCELERATION:g} rad/s^2"
+    return f"safety layer at work in {plan.changed / max(len(plan.joints) - 1, 1):.0%}"
 
 
 def _clearance(planned: Planned, certificate: Certificate | None) -> str:

@@ -20,7 +20,7 @@ from .clearance import (
     first_joint,
 )
 from .jit import inner, kernel
-from .qp import BOUND, MULTIPLIER, SLACK, SOFTNESS, inverse_weight, solve
+from .qp import BOUND, MULTIPLIER, SLACK, SOFTNESS, all_hold, inverse_weight, solve
 from .robot_work import (
     ACTIVE,
     ARMS,
@@ -187,8 +187,10 @@ def constrain(g, q, x):
     n = int(g[HEADER, N_JOINTS])
     count = _lay_bounds(g, q)
     first = int(g[HEADER, BOUNDS])
-    _lay_weight(g)
     rows = g[first : first + count]
+    if all_hold(rows, count, x, n):
+        return False
+    _lay_weight(g)
     ok = solve(x, g[WEIGHT:], rows, count, g[ACTIVE], g[FACTOR : FACTOR + 32], n)
     missed = not ok
     for k in range(int(g[HEADER, N_NEAR])):

@@ -159,13 +159,13 @@ def find_near(g, shell):
     return least
 
 
-@inner
-def _lever(g, joint, p):
-    """Distance [m] of a world point from the axis of a joint; 1 for a sliding joint (way per unit of q)."""
+@inlined
+def _lever_square(g, joint, p):
+    """Squared distance [m^2] of a world point from the axis of a joint that turns."""
     f = FRAMES + joint
     axis = (g[f, 0], g[f, 1], g[f, 2])
     arm = screw.cross(axis, (p[0] - g[f, 3], p[1] - g[f, 4], p[2] - g[f, 5]))
-    return math.sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
+    return arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]
 
 
 @kernel
@@ -185,7 +185,8 @@ def bound_motion(g, world, step):
                 if g[SLIDING, joint] == 1.0:
                     way += abs(step[joint])
                 else:
-                    way += abs(step[joint]) * (max(_lever(g, joint, a), _lever(g, joint, b)) + way)
+                    square = max(_lever_square(g, joint, a), _lever_square(g, joint, b))
+                    way += abs(step[joint]) * (math.sqrt(square) + way)
         g[world + c, W_REACH] = way
 
 
@@ -262,11 +263,18 @@ def _part_is_clear(g, q, step, start, dt):
     """True if all near pairs stay clear during a part of a step; leaves the capsules at its end in NEXT."""
     place_capsules(g, q, WORLD)
     bound_motion(g, WORLD, step)
-    turning = 0.0
     for i in range(len(q)):
-        turning += abs(step[i]) if g[SLIDING, i] == 0.0 else 0.0
         g[AFTER, i] = q[i] + step[i]
     place_capsules(g, g[AFTER, : len(q)], NEXT)
+    return placed_step_stays_clear(g, step, start, dt)
+
+
+@kernel
+def placed_step_stays_clear(g, step, start, dt):
+    """True if all near pairs stay clear from WORLD to NEXT, where they are placed, their ways bound."""
+    turning = 0.0
+    for i in range(len(step)):
+        turning += abs(step[i]) if g[SLIDING, i] == 0.0 else 0.0
     first = int(g[HEADER, NEAR])
     for row in range(first, first + int(g[HEADER, N_NEAR])):
         # a pair that is already closer than wanted may not come closer than a hair

@@ -60,7 +60,8 @@ def _rows(name: str, value: ArrayLike, width: int) -> Array:
 
 
 def _flat(array: Array, shape: tuple[int, ...], width: int) -> Array:
-    return np.ascontiguousarray(np.broadcast_to(array, (*shape, width)).reshape(-1, width))
+    spread = array if array.shape == (*shape, width) else np.broadcast_to(array, (*shape, width))
+    return np.ascontiguousarray(spread.reshape(-1, width))
 
 
 @kernel

@@ -140,6 +140,12 @@ def point_speeds(g, twist):
     return fastest
 
 
+@kernel
+def longest_way(g, x, y):
+    """Longest way [m] of any point of the tool along the screw from pose x to pose y."""
+    return point_speeds(g, screw.twist_of(screw.mul(screw.conj(x), y)))
+
+
 @inner
 def _stretch(g, left, fastest):
     """Fraction of the screw that is proven clear from the tool at NEXT on; -1 if it is too close already."""
@@ -163,11 +169,10 @@ def _stretch(g, left, fastest):
 def screw_is_clear(g, x, y):
     """True if the tool keeps clear along the screw from pose x to pose y, the shorter way round, ends included."""
     twist = screw.twist_of(screw.mul(screw.conj(x), y))
-    fastest = point_speeds(g, twist)
     for s in (0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
-        if tool_room(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), 0.1) < 0.0:
+        if tool_room(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), 0.0) < 0.0:
             return False
-    s = 0.0
+    fastest, s = point_speeds(g, twist), 0.0
     for _ in range(2000):
         place_tool(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), NEXT)
         stretch = _stretch(g, 1.0 - s, fastest)
@@ -175,7 +180,7 @@ def screw_is_clear(g, x, y):
             return False
         s += stretch
         if s >= 1.0:
-            return tool_room(g, y, 1.0) >= 0.0
+            return tool_room(g, y, 0.0) >= 0.0
         if stretch * fastest < SMALLEST:
             return False
     return False

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 
 from . import screw
-from .edges import is_clear, tool_room
+from .edges import is_clear, longest_way, tool_room
 from .escape_tree import (
     AWAY,
     CANDIDATES,
     GROW,
+    MOST,
     ON_SHELL,
     PARENT,
     RANDOM,
@@ -29,29 +30,40 @@ from .escape_tree import (
 )
 from .jit import inner, kernel
 
-FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG = 0, 1, 2, 3, 4, 5
-"""The path was clear; detours were found; why not."""
+FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
+"""The path was clear; detours were found; why not. NODE_LIMIT: a tree was stopped while it still had leaves."""
 LEAST_ROOM = 0.005
 """Room [m] that a root and the way back have at least, where an obstacle's own margin fills the shell."""
+
+FAR_AHEAD = 0.5
+"""Room [m] beyond which it does not matter how much there is."""
 
 
 @kernel
 def first_blocked(g, path, count, first, options):
-    """Index of the pose before the first edge that is not clear, from `first` on; -1 if all are."""
+    """Index of the pose before the first edge that is not clear, from `first` on; -1 if all are.
+
+    Where there is room, one look at it proves several edges: none of them can use up more of it than its way.
+    """
+    left = 0.0
     for k in range(first, count - 1):
         x, y = screw.load8(path, k), screw.load8(path, k + 1)
         if options[ON_SHELL] == 1.0 and tool_room(g, y, 1.0) < max(options[SHELL] - options[WIDEST], LEAST_ROOM):
             return k
-        if not is_clear(g, x, y, options[WIDEST]):
+        way = longest_way(g, x, y)
+        if left <= way:
+            left = tool_room(g, x, FAR_AHEAD)
+        if left <= way and not is_clear(g, x, y, options[WIDEST]):
             return k
+        left -= way
     return -1
 
 
 @inner
-def _rooms(g, path, count, rooms):
-    """Room [m] at every pose, up to 1 m."""
+def _rooms(g, path, count, rooms, cutoff):
+    """Room [m] at every pose, up to the cutoff."""
     for k in range(count):
-        rooms[k] = tool_room(g, screw.load8(path, k), 1.0)
+        rooms[k] = tool_room(g, screw.load8(path, k), cutoff)
 
 
 @inner
@@ -160,9 +172,9 @@ def _joined(path, count, root, branch, size, back, out, spacing):
 
 @inner
 def _grown(g, root, candidates, tree, cells, heap, options, state):
-    """Grow trees at changing scales until one gets home: (row, candidate, rows of the last tree)."""
+    """Grow trees at changing scales until one gets home: (row, candidate, rows of the last, True if one was full)."""
     random, away = options[RANDOM], options[AWAY]
-    row, j, count = -1, -1, 0
+    row, j, count, full = -1, -1, 0, False
     for attempt in range(int(options[RETRIES]) + 1):
         scale = 1.0
         if attempt > 0:
@@ -171,8 +183,15 @@ def _grown(g, root, candidates, tree, cells, heap, options, state):
         row, j, count = grow(g, root, candidates, tree, cells, heap, options, scale * options[STEP], state)
         if row >= 0:
             break
+        full |= count >= min(len(tree), int(options[MOST]))
     options[RANDOM], options[AWAY] = random, away
-    return row, j, count
+    return row, j, count, full
+
+
+@kernel
+def last_tree(status, detours, most):
+    """Row of the log of `escape` that tells of the tree left behind: that of the failed detour, if one failed."""
+    return detours - 1 if status == ESCAPED else min(detours, most - 1)
 
 
 @kernel
@@ -207,13 +226,13 @@ def escape(g, path, count, out, rooms, places, poses, branch, tree, cells, heap,
         blocked = first_blocked(g, path, count, certain, options)
         if blocked < 0:
             return (ESCAPED if detour else FREE), count, detour
-        _rooms(g, path, count, rooms)
+        _rooms(g, path, count, rooms, enough)
         root = _root(rooms, blocked, enough)
         size = _candidates(path, rooms, count, blocked, enough, int(options[CANDIDATES]), places, poses)
-        row, j, rows = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
+        row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
         log[detour, 0] = rows
         if row < 0:
-            return NO_ESCAPE, count, detour
+            return (NODE_LIMIT if full else NO_ESCAPE), count, detour
         length = _branch(tree, row, branch)
         screw.store8(branch, length, screw.load8(poses, j))
         length += 1

@@ -40,7 +40,7 @@ KEPT, REJECTED_EDGE, VISITED, OUTSIDE, GOAL_EDGE = 0, 1, 2, 3, 4
 """Verdicts on a child: kept; its edge is not clear; a kept one is there already; outside the workspace; it sees the
 path again."""
 CELLS = 8192
-"""Size of the table of visited cells."""
+"""Size of the table of visited cells, a power of two."""
 
 STEP, LEVELS, BEAM, WORLD_BASIS, SQUARE, GOAL_COST, SPREAD, TURN, RANDOM, AWAY, MOST = range(11)
 BIAS, LOWEST, HIGHEST, PULL, CELL, WIDEST, SHELL, ROUNDS, RETRIES, GROW, SHRINK = (
@@ -84,14 +84,14 @@ def _visited(p, attitude, size, cells):
     # the middle of a cell at the root: whole steps from it lie inside cells, not on their edges
     x, y, z = math.floor(p[0] / size + 0.5), math.floor(p[1] / size + 0.5), math.floor(p[2] / size + 0.5)
     number = ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791) ^ (attitude * 2654435761)) & 0x7FFFFFFF
-    slot, key = number % len(cells), float(number)
+    slot, key = number & (len(cells) - 1), float(number)
     for _ in range(len(cells)):
         if cells[slot] == key:
             return True
         if cells[slot] < 0.0:
             cells[slot] = key
             return False
-        slot = slot + 1 if slot + 1 < len(cells) else 0
+        slot = (slot + 1) & (len(cells) - 1)
     return True
 
 
@@ -109,8 +109,9 @@ def lay_plane(g, tree, row, towards, options, step):
     x = screw.load8(tree, row)
     place_tool(g, x, WORLD)
     least, normal = math.inf, (0.0, 0.0, 1.0)
+    longest = step * max(2.0, math.sqrt(2.0 + options[AWAY] * options[AWAY]))  # of a random child's way
     for widening in (1.0, 4.0, 1e6):
-        find_near(g, 2.0 * widening * step + options[WIDEST])
+        find_near(g, widening * longest + options[WIDEST])
         first = int(g[HEADER, NEAR])
         for k in range(first, first + int(g[HEADER, N_NEAR])):
             if g[k, GAP] - g[k, KEEP] < least:
@@ -144,22 +145,21 @@ def _turned(x, axis, angle):
 
 
 @inlined
-def _from_root(tree, p):
-    """A world point seen from the root, so that the cells turn with the problem."""
+def _from_root(tree):
+    """What turns world points into the root's frame, so that the cells turn with the problem: turn and position."""
     x = screw.load8(tree, 0)
-    q = screw.translation(x)
-    return screw.rotate((x[0], -x[1], -x[2], -x[3]), (p[0] - q[0], p[1] - q[1], p[2] - q[2]))
+    return (x[0], -x[1], -x[2], -x[3]), screw.translation(x)
 
 
 @inlined
-def _judge(g, tree, row, count, y, p, clear, way, home, goal, cells, options, step, attitude):
+def _judge(tree, row, count, y, p, clear, way, home, goal, cells, options, step, attitude, from_root):
     """Append a child at pose y, position p, with the verdict on it."""
-    verdict = KEPT
+    verdict, (turn, q) = KEPT, from_root
     if _outside(p, options):
         verdict = OUTSIDE
     elif not clear:
         verdict = REJECTED_EDGE
-    elif _visited(_from_root(tree, p), attitude, options[CELL] * step, cells):
+    elif _visited(screw.rotate(turn, (p[0] - q[0], p[1] - q[1], p[2] - q[2])), attitude, options[CELL] * step, cells):
         verdict = VISITED
     length = tree[row, LENGTH] + way
     cost = home + (0.0 if options[GOAL_COST] == 1.0 else length)
@@ -173,7 +173,7 @@ def _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state
     """Children that keep their parent's orientation, and so all that hangs on it; the new number of rows."""
     normal, u, v = plane
     p, q, attitude = screw.translation(x), screw.translation(goal), _attitude_key(tree, x)
-    turn, r = 0.2 * screw.gap(x, goal)[1], (x[0], x[1], x[2], x[3])
+    turn, r, from_root, room = 0.2 * screw.gap(x, goal)[1], (x[0], x[1], x[2], x[3]), _from_root(tree), tree[row, ROOM]
     for k in range(SIDES + int(options[RANDOM])):
         if count >= len(tree):
             break
@@ -183,8 +183,9 @@ def _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state
         way = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
         x_, y_, z_ = q[0] - end[0], q[1] - end[1], q[2] - end[2]
         home = math.sqrt(x_ * x_ + y_ * y_ + z_ * z_ + turn * turn)
-        clear = slide_is_clear(g, delta)
-        _judge(g, tree, row, count, screw.from_pose(end, r), end, clear, way, home, q, cells, options, step, attitude)
+        clear = way < room or slide_is_clear(g, delta)
+        y = screw.from_pose(end, r)
+        _judge(tree, row, count, y, end, clear, way, home, q, cells, options, step, attitude, from_root)
         count += 1
     return count
 
@@ -194,7 +195,7 @@ def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state
     """Children that turn on the way home, are pulled back to the shell, or turn where they are and go straight on."""
     normal, u, v = plane
     q, moves = screw.translation(goal), SIDES + int(options[RANDOM])
-    first = 0 if options[SPREAD] == 1.0 or options[PULL] == 1.0 else moves
+    first, from_root = 0 if options[SPREAD] == 1.0 or options[PULL] == 1.0 else moves, _from_root(tree)
     for k in range(first, moves + (7 if options[TURN] > 0.0 else 0)):
         if count >= len(tree):
             break
@@ -212,8 +213,8 @@ def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state
         way, angle = screw.gap(x, y)
         home, left = screw.gap(y, goal)
         clear = edge_is_clear(g, x, y)
-        _judge(g, tree, row, count, y, screw.translation(y), clear, math.hypot(way, 0.2 * angle),
-               math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(tree, y))  # fmt: skip
+        _judge(tree, row, count, y, screw.translation(y), clear, math.hypot(way, 0.2 * angle),
+               math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(tree, y), from_root)  # fmt: skip
         count += 1
     return count
 

@@ -89,6 +89,9 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     before = config.CACHE_DIR
+    # nothing is allocated in a kernel, so references to arrays need not be counted: it is done atomically, at every
+    # call that is inlined, and took as long as a distance does. A kernel that allocates does not compile
+    options["_nrt"] = False
     config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))
     try:
         compiler: Any = numba.njit

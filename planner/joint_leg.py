@@ -20,7 +20,7 @@ from .scene_work import SceneWork
 from .tsia import guide_index, imitated_path
 
 if TYPE_CHECKING:
-    from .planning import PlanSettings
+    from .plans import PlanSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,7 @@ class JointSearchSettings:
         postures: most postures that are searched for, the most promising first.
         rounds: how often, each time with twice as many seeds.
         margin: smallest joint margin [rad] that a posture should have, so that the next leg has somewhere to go.
+        late: what coming back to the demonstrated path only at its end costs, in radians of way.
         shortcuts: tries to leave out points of what was found.
         speed: of the largest joint speed, on the way found.
     """
@@ -48,6 +49,7 @@ class JointSearchSettings:
     postures: int = 4
     rounds: int = 3
     margin: float = 0.15
+    late: float = 3.0
     shortcuts: int = 60
     speed: float = 0.4
 
@@ -55,6 +57,8 @@ class JointSearchSettings:
         for name in ("step", "speed"):
             if not 0 < getattr(self, name) <= 10:
                 raise BadOption(name, f"{getattr(self, name)} is not a positive number up to 10")
+        if not 0.0 <= self.late <= 1000.0:
+            raise BadOption("late", f"{self.late} is not from 0 to 1000")
         for name in ("iterations", "nodes", "seeds", "targets", "postures", "rounds"):
             if not 1 <= getattr(self, name) <= 10**6:
                 raise BadOption(name, f"{getattr(self, name)} is not from 1 to a million")
@@ -66,11 +70,13 @@ class JointLeg(NamedTuple):
     Attributes:
         joints: (t, dof) joints at every tick.
         path: the part of the demonstrated path that is followed at the end.
+        guide: index in the imitated path at which that part begins.
         margin: smallest joint margin [rad].
     """
 
     joints: np.ndarray
     path: PosePath
+    guide: int
     margin: float
 
 
@@ -80,6 +86,7 @@ class _Posture(NamedTuple):
     q: np.ndarray
     tail: np.ndarray
     path: PosePath
+    guide: int
 
 
 def joint_leg(
@@ -121,7 +128,7 @@ def joint_leg(
                 count = shortcut(scene.robot, out, count, search.shortcuts, state)
                 way = _timed(out[:count], search.speed * arm.velocity_limits * settings.motion.dt)
                 joints = np.vstack([way[:-1], posture.tail])
-                return JointLeg(joints, posture.path, min(arm.margin(row) for row in joints))
+                return JointLeg(joints, posture.path, posture.guide, min(arm.margin(row) for row in joints))
     return None
 
 
@@ -143,9 +150,10 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, se
             if tail is None:
                 continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
+            cost += search.late * (index - first) / max(last - first, 1)
             if onward is not None and _followed(scene, work, onward, tail[-1], settings)[0] is None:
                 cost += 5.0
-            found.append(_Posture(cost, len(found), solution, tail, path))
+            found.append(_Posture(cost, len(found), solution, tail, path, index))
     return found
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from .clearance import SELF_MARGIN, all_beyond, bound_motion, capsule_distance, obstacle_distance, room_at
-from .jit import inner, kernel
+from .jit import inlined, inner, kernel
 from .robot_work import (
     AFTER,
     B_FRAME,
@@ -148,6 +148,12 @@ def _read_branch(tree, parents, row, out, at, back, n):
     return at + count
 
 
+@inlined
+def _changed(counts, k, value):
+    """The pair with another number in place k."""
+    return (value, counts[1]) if k == 0 else (counts[0], value)
+
+
 @kernel
 def connect(g, start, goal, trees, parents, step, iterations, state, out):
     """A clear path in joint space from start to goal, the number of its points; 0 if none was found.
@@ -167,7 +173,7 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
     for i in range(n):
         trees[0, 0, i], trees[1, 0, i] = start[i], goal[i]
     parents[0, 0] = parents[1, 0] = -1
-    counts = [1, 1]
+    counts = (1, 1)
     sample = g[8, 16 : 16 + n]
     for k in range(iterations):
         a, b = (0, 1) if k % 2 == 0 else (1, 0)
@@ -178,13 +184,14 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
             for i in range(n):
                 sample[i] = trees[b, 0, i]
         before = counts[a]
-        counts[a], _ = _extend(g, trees[a], parents[a], counts[a], sample, step, k < 2)
+        counts = _changed(counts, a, _extend(g, trees[a], parents[a], before, sample, step, k < 2)[0])
         if counts[a] == before:
             continue
         if counts[a] == len(trees[a]) or counts[b] == len(trees[b]):
             return 0
         target = trees[a, counts[a] - 1]
-        counts[b], met = _extend(g, trees[b], parents[b], counts[b], target, step, True)
+        count, met = _extend(g, trees[b], parents[b], counts[b], target, step, True)
+        counts = _changed(counts, b, count)
         if met:
             at = _read_branch(trees[0], parents[0], counts[0] - 1, out, 0, False, n)
             # the two trees share the point at which they have met

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import screw
-from .escape import ESCAPED, escape, write_edge
+from .escape import ESCAPED, escape, last_tree, write_edge
 from .escape_tree import tree_arrays
 from .guarded import guarded_roll_out
 from .jit import inner, kernel
@@ -136,11 +136,12 @@ def leg(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, memory, wi
     counts[IMITATED], counts[GUIDE], counts[LAST], counts[CHANGED] = n, guide, 0, 0
     if full == 0:
         return -1, 0, -math.inf
+    b.log[:] = 0.0
     status, full, counts[DETOURS] = escape(
         tool, b.path, full, b.spare, b.rooms, b.places, b.poses, b.branch, b.tree, b.cells, b.heap, b.options,
         b.state, b.log,
     )  # fmt: skip
-    counts[FULL], counts[TREE_ROWS] = full, b.log[max(counts[DETOURS] - 1, 0), 0]
+    counts[FULL], counts[TREE_ROWS] = full, b.log[last_tree(status, counts[DETOURS], len(b.log)), 0]
     if status == ESCAPED:
         followed = _copied(b.path, 0, full, b.followed, 0)
     else:

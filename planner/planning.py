@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,127 +21,43 @@ from .arm import Arm
 from .body import Body
 from .chain import FRAME, forward_into
 from .errors import BadOption
-from .escape import ESCAPED, FREE, GOAL_IN_COLLISION, START_IN_COLLISION
-from .joint_leg import JointSearchSettings, joint_leg
-from .leg import CHANGED, DETOURS, FOLLOWED, FULL, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
-from .motions import MotionSettings
+from .escape import ESCAPED, FREE, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
+from .escape_tree import CANDIDATES, ROUNDS, WIDEST
+from .joint_leg import joint_leg
+from .leg import CHANGED, DETOURS, FOLLOWED, FULL, GUIDE, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
+from .plans import WHY, Asked, Plan, PlanSettings, Problem
 from .pose import Pose, PosePath
 from .pursuit import ARRIVED
-from .repet import REASONS, Corner, EscapeTree, RepetSettings
-from .safety import SafetySettings
+from .repet import Corner
 from .scene_work import Layout, SceneWork, checked_obstacles
 from .shapes import Obstacle
+from .tsia import guide_index, imitated_path
 from .workspace import bound
 
-BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0))
 
-WHY = {
-    **REASONS,
-    START_IN_COLLISION: "no room for a detour at the start",
-    GOAL_IN_COLLISION: "no room for a detour at the goal",
-}
-"""Of an escape that was not found: start and goal have been seen to be clear before."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlanSettings:
-    """How a leg is planned.
+class Attempt(NamedTuple):
+    """A closed loop that may be tried.
 
     Attributes:
-        motion: imitation, controller and pursuit.
-        repet: escape trees.
-        safety: the layer that keeps the whole arm clear.
-        search: the search in joint space; None for none.
-        biases: what detours are tried for, one after the other; see `RepetSettings.bias`.
-        tight: factor of the planning margin in the second half of the tries.
-        spacing: screw length [m] between poses of a blend.
-        max_seconds: longest motion.
-        avoid: False: no detours and no search, the safety layer alone.
+        guide: fraction of the imitated path where the guiding pose is.
+        bias: of the detours, see `RepetSettings.bias`.
+        factor: of the planning margin.
+        early: detours come back to the path at the first pose that they can.
     """
 
-    motion: MotionSettings = field(default_factory=MotionSettings)
-    repet: RepetSettings = field(default_factory=RepetSettings)
-    safety: SafetySettings = field(default_factory=SafetySettings)
-    search: JointSearchSettings | None = field(default_factory=JointSearchSettings)
-    biases: tuple[Corner, ...] = BIASES
-    tight: float = 0.7
-    spacing: float = 0.01
-    max_seconds: float = 30.0
-    avoid: bool = True
-
-    def __post_init__(self):
-        if not 0.0 < self.tight <= 1.0:
-            raise BadOption("tight", f"{self.tight} is not in (0, 1]")
-        if not self.biases:
-            raise BadOption("biases", "there must be at least one")
-        for name in ("spacing", "max_seconds"):
-            if not 0 < getattr(self, name) < 3600:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number below 3600")
-        if self.repet.distance * self.tight < self.safety.distance:
-            reason = f"{self.repet.distance} times {self.tight} is below the safety distance {self.safety.distance}"
-            raise BadOption("repet.distance", reason)
+    guide: float
+    bias: Corner
+    factor: float = 1.0
+    early: bool = False
 
 
-class Plan(NamedTuple):
-    """A planned leg.
+class _Run(NamedTuple):
+    """One call of `Planner.plan`: what was asked, the arm among the obstacles, the demonstration, the joints."""
 
-    Attributes:
-        joints: (t, dof) joints at every tick, from the start; only the start where nothing was found.
-        dt: seconds between them.
-        reason: "" if the plan arrives and every step of it is proven clear; else why there is none.
-        how: "direct", "escape" or "joint search".
-        imitated_poses: (n, 8) of the demonstration moved to the goal.
-        path_poses: (m, 8) of what was followed: the imitated path behind the guiding pose, or a detour.
-        tree_rows: of the last escape tree; none if none was grown.
-        detours: number of them.
-        margin: smallest joint margin on the way [rad].
-        changed: ticks in which the safety layer changed the command.
-        tries: closed loops that were tried.
-        seconds: that planning took.
-    """
-
-    joints: np.ndarray
-    dt: float
-    reason: str
-    how: str
-    imitated_poses: np.ndarray
-    path_poses: np.ndarray
-    tree_rows: np.ndarray
-    detours: int
-    margin: float
-    changed: int
-    tries: int
-    seconds: float
-
-    @property
-    def success(self) -> bool:
-        """The plan arrives, and every step of it is proven clear."""
-        return not self.reason
-
-    @property
-    def imitated(self) -> PosePath:
-        """The demonstration moved to the goal."""
-        return PosePath(self.imitated_poses)
-
-    @property
-    def path(self) -> PosePath:
-        """What was followed: the imitated path behind the guiding pose, or a detour."""
-        return PosePath(self.path_poses)
-
-    @property
-    def tree(self) -> EscapeTree | None:
-        """The last escape tree, None if none was grown."""
-        return EscapeTree.from_rows(self.tree_rows) if len(self.tree_rows) else None
-
-
-class Problem(NamedTuple):
-    """A leg to plan; see `Planner.plan`."""
-
+    asked: Asked
+    scene: SceneWork
     demonstrated: PosePath
-    start: np.ndarray
-    goal: Pose
-    obstacles: tuple[Obstacle, ...] = ()
-    seed: int = 0
+    q: np.ndarray
 
 
 class Planner:
@@ -193,98 +109,178 @@ class Planner:
         begun = time.perf_counter()
         q = self.arm.checked(start)
         scene = SceneWork(self._layout, checked_obstacles(obstacles), self.settings.repet.distance, allowed)
-        reason = self._unfit(scene, q, goal)
+        asked = Asked(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings)
+        run = _Run(asked, scene, demonstrated, q)
+        reason, detail = self._unfit(scene, q, goal)
         if reason:
-            return self._failed(reason, q, demonstrated, begun)
-        lead = leaving.dqs.copy() if leaving is not None else self._pose(q)[None]
-        best, escapes = "", []
-        for fraction, bias, factor in self._attempts(escapes):
-            status, pursuit, margin = self._leg(scene, demonstrated, goal, lead, q, fraction, bias, factor, seed)
+            return self._failed(run, reason, detail)
+        best, tries = self._followed(run, leaving.dqs.copy() if leaving is not None else self._pose(q)[None], seed)
+        if not best.success or best.end_margin < self.settings.end_margin:
+            best = self._searched(run, best, onward, seed)
+        return best._replace(tries=tries, seconds=time.perf_counter() - begun)
+
+    def _followed(self, run: _Run, lead: np.ndarray, seed: int) -> tuple[Plan, int]:
+        """The first good plan of the closed loops, else the best of a few, else why there is none; and the tries."""
+        escapes, best, extra, failed = [], None, self.settings.effort, None
+        for attempt in self._attempts(escapes):
+            if best is not None:
+                if extra == 0:
+                    break
+                extra -= 1
+            status, pursuit, margin = self._leg(run, lead, attempt, seed)
             escapes.append(status)
             if pursuit == ARRIVED:
                 # also where the tool is too close for a detour: the safety layer has proven every step
-                how = "escape" if status == ESCAPED else "direct"
-                return self._plan(how, margin, len(escapes), begun)
-            best = best or WHY.get(status, "") or "ik_or_limit"
-        found = None
-        if self.settings.search is not None and self.settings.avoid:
-            found = joint_leg(self.arm, scene, self._work, demonstrated, goal, q, self.settings, onward, seed)
+                found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
+                if self._is_good(found) or self.settings.effort == 0:
+                    return found, len(escapes)
+                best = found if best is None else _better(best, found)
+            elif failed is None:
+                reason = WHY.get(status, "") or "ik_or_limit"
+                failed = reason, self._detail(run, status, attempt.factor)
+        if best is None:
+            assert failed is not None
+            best = self._failed(run, *failed, tried=True)
+        return best, len(escapes)
+
+    def _searched(self, run: _Run, best: Plan, onward: PosePath | None, seed: int) -> Plan:
+        """The better of a plan, which may be none, and one of a search in joint space."""
+        settings = self.settings
+        if settings.search is None or not settings.avoid or (best.success and settings.effort == 0):
+            return best
+        if best.success:
+            rounds = min(settings.search.rounds, settings.effort)
+            settings = replace(settings, search=replace(settings.search, rounds=rounds))
+        found = joint_leg(
+            self.arm, run.scene, self._work, run.demonstrated, run.asked.goal, run.q, settings, onward, seed
+        )
         if found is None:
-            return self._failed(best, q, demonstrated, begun, len(escapes))
-        self._buffers.counts[DETOURS] = self._buffers.counts[TREE_ROWS] = 0
-        plan = self._plan("joint search", found.margin, len(escapes), begun)
-        return plan._replace(joints=found.joints, path_poses=found.path.dqs)
+            return best
+        imitated = imitated_path(run.demonstrated, run.asked.goal)
+        plan = Plan(
+            found.joints, settings.motion.dt, "", "joint search", imitated.dqs, found.path.dqs, self._buffers.tree[:0],
+            0, found.margin, 0, 0, 0.0, run.asked, "", found.guide,
+            _kept(imitated.dqs, found.path.dqs, settings.motion.guide),
+        )  # fmt: skip
+        return _better(best, plan) if best.success else plan
+
+    def _is_good(self, plan: Plan) -> bool:
+        return plan.kept >= self.settings.keep and plan.end_margin >= self.settings.end_margin
 
     def _pose(self, q: np.ndarray) -> np.ndarray:
         out = np.empty(8)
         forward_into(self.arm.chain, q, np.empty((self.arm.dof, FRAME)), out)
         return out
 
-    def _unfit(self, scene: SceneWork, q: np.ndarray, goal: Pose) -> str:
+    def _unfit(self, scene: SceneWork, q: np.ndarray, goal: Pose) -> tuple[str, str]:
+        """Why start or goal cannot be, and what in this case; "" if they can."""
         if self.arm.margin(q) < 0.0:
-            return "start beyond a joint limit"
+            margins = np.minimum(q - self.arm.lower, self.arm.upper - q)
+            joint = int(np.argmin(margins))
+            return "start beyond a joint limit", f"{self.arm.joint_names[joint]} by {-margins[joint]:.3f} rad"
         if scene.room(q) < 0.0:
-            return "start in collision"
+            return "start in collision", str(scene.tightest(q))
         if scene.tool_room(goal) < 0.0:
-            return "goal in collision"
-        return ""
+            return "goal in collision", str(scene.tightest_of_tool(goal))
+        return "", ""
 
-    def _attempts(self, escapes: list[int]) -> Iterator[tuple[float, Corner, float]]:
-        """Guide, bias and margin factor of each closed loop that is tried, the likeliest first.
+    def _detail(self, run: _Run, status: int, factor: float) -> str:
+        """What is to be said of an escape that was not found."""
+        rows, repet = int(self._buffers.counts[TREE_ROWS]), self.settings.repet
+        if status == START_IN_COLLISION:
+            return str(run.scene.tightest_of_tool(Pose(self._pose(run.q)), factor))
+        if status == GOAL_IN_COLLISION:
+            return str(run.scene.tightest_of_tool(run.asked.goal, factor))
+        if status == NODE_LIMIT:
+            return f"a tree had {repet.nodes} nodes, see repet.nodes"
+        return f"{rows} nodes in the last of {repet.retries + 1} trees" if status == NO_ESCAPE else ""
+
+    def _attempts(self, escapes: list[int]) -> Iterator[Attempt]:
+        """The closed loops that may be tried, the likeliest first.
 
         Args:
             escapes: statuses of the tries so far: biases help where the arm could not follow a detour, not where
                 there is none.
         """
         settings, (guide, later) = self.settings, (self.settings.motion.guide, self.settings.motion.max_guide)
-        yield guide, settings.biases[0], 1.0
+        first = settings.biases[0]
+        yield Attempt(guide, first)
+        if escapes[-1] == ESCAPED:
+            yield Attempt(guide, first, early=True)
         if escapes[-1] in (FREE, ESCAPED):
-            yield later, settings.biases[0], 1.0
+            yield Attempt(later, first)
         if not settings.avoid:
             return
-        yield guide, settings.biases[0], settings.tight
+        yield Attempt(guide, first, settings.tight)
         if escapes[-1] == ESCAPED:
             for bias in settings.biases[1:]:
-                yield guide, bias, settings.tight
+                yield Attempt(guide, bias, settings.tight)
 
-    def _leg(self, scene, demonstrated, goal, lead, q, fraction, bias, factor, seed):
-        b, motion = self._buffers, self.settings.motion
-        tool = scene.tool(factor)
-        packed = self.settings.repet.packed() if bias == BIASES[0] else replace(self.settings.repet, bias=bias).packed()
-        b.options[:] = packed
-        b.options[22] = scene.widest(factor)
+    def _leg(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
+        b, motion, repet = self._buffers, self.settings.motion, self.settings.repet
+        tool = run.scene.tool(attempt.factor)
+        b.options[:] = (repet if attempt.bias == repet.bias else replace(repet, bias=attempt.bias)).packed()
+        b.options[WIDEST] = run.scene.widest(attempt.factor)
+        if attempt.early:
+            b.options[CANDIDATES] = 1.0
         if not self.settings.avoid:
-            b.options[24] = 0.0  # no rounds
+            b.options[ROUNDS] = 0.0
         b.state[0] = float(seed % 2147483646) + 1.0
         return leg(
-            self._work, scene.robot, tool, demonstrated.dqs, goal.dq, lead, q.copy(), fraction, self.settings.spacing,
-            motion.dt, b, self._memory, self._wish, self._out,
+            self._work, run.scene.robot, tool, run.demonstrated.dqs, run.asked.goal.dq, lead, run.q.copy(),
+            attempt.guide, self.settings.spacing, motion.dt, b, self._memory, self._wish, self._out,
         )  # fmt: skip
 
-    def _plan(self, how: str, margin: float, tries: int, begun: float) -> Plan:
-        b, counts = self._buffers, self._buffers.counts
-        rows = int(counts[TREE_ROWS])
+    def _plan(self, run: _Run, how: str, margin: float, attempt: Attempt) -> Plan:
+        b, counts, guide = self._buffers, self._buffers.counts, self.settings.motion.guide
+        imitated, path = b.imitated[: counts[IMITATED]].copy(), b.followed[: counts[FOLLOWED]].copy()
+        whole = how == "direct" and attempt.guide == guide
         return Plan(
             b.trace[: counts[LAST] + 1].copy(),
             self.settings.motion.dt,
             "",
             how,
-            b.imitated[: counts[IMITATED]].copy(),
-            b.followed[: counts[FOLLOWED]].copy(),
-            b.tree[:rows].copy(),
+            imitated,
+            path,
+            b.tree[: counts[TREE_ROWS]].copy(),
             int(counts[DETOURS]),
             float(margin),
             int(counts[CHANGED]),
-            tries,
-            time.perf_counter() - begun,
+            0,
+            0.0,
+            run.asked,
+            guide=int(counts[GUIDE]),
+            kept=1.0 if whole else _kept(imitated, path, guide),
         )
 
-    def _failed(self, reason: str, q: np.ndarray, demonstrated: PosePath, begun: float, tries: int = 0) -> Plan:
-        b, counts = self._buffers, self._buffers.counts if tries else np.zeros(8, dtype=np.int64)
-        path = b.path[: counts[FULL]].copy() if counts[FULL] else demonstrated.dqs
-        seconds, dt = time.perf_counter() - begun, self.settings.motion.dt
-        tree = b.tree[: counts[TREE_ROWS]].copy()
-        return Plan(q[None], dt, reason, "", demonstrated.dqs, path, tree, 0, -np.inf, 0, tries, seconds)
+    def _failed(self, run: _Run, reason: str, detail: str, *, tried: bool = False) -> Plan:
+        b, counts = self._buffers, self._buffers.counts if tried else np.zeros(8, dtype=np.int64)
+        path = b.path[: counts[FULL]].copy() if counts[FULL] else run.demonstrated.dqs
+        tree, dt = b.tree[: counts[TREE_ROWS]].copy(), self.settings.motion.dt
+        return Plan(
+            run.q[None], dt, reason, "", run.demonstrated.dqs, path, tree, 0, -np.inf, 0, 0, 0.0, run.asked, detail,
+            kept=0.0,
+        )  # fmt: skip
+
+
+def _kept(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
+    """Screw length of the imitated path's (n, 8) edges that are in a path (m, 8), over that behind the guiding pose.
+
+    Bit by bit: what is followed is copied.
+    """
+    if len(imitated) < 2:
+        return 1.0
+    rows = {row.tobytes() for row in path}
+    there = np.array([row.tobytes() in rows for row in imitated])
+    whole = PosePath(imitated)
+    lengths = whole.lengths()
+    wanted = lengths[-1] - lengths[guide_index(whole, guide)]
+    return float(np.diff(lengths) @ (there[1:] & there[:-1]) / wanted) if wanted > 0.0 else 1.0
+
+
+def _better(one: Plan, other: Plan) -> Plan:
+    """The plan that keeps more of the demonstration; of those that keep as much, the one that ends freer."""
+    return max((one, other), key=lambda plan: (round(plan.kept, 1), plan.end_margin))
 
 
 def plan(
@@ -311,15 +307,18 @@ def plan_batch(
         arm: the arm.
         body: its capsules.
         settings: see `PlanSettings`.
-        workers: threads; the compiled loops let go of the interpreter.
+        workers: threads; the compiled loops let go of the interpreter. Each takes the next problem when it is done
+            with its last: a few hard ones take longer than all others together.
     """
     if not 1 <= workers <= 256:
         raise BadOption("workers", f"{workers} is not from 1 to 256")
 
-    def run(share: Sequence[Problem]) -> list[Plan]:
-        planner = Planner(arm, body, settings)
-        return [planner.plan(p.demonstrated, p.start, p.goal, p.obstacles, seed=p.seed) for p in share]
+    left = iter(enumerate(problems))  # taking the next of it is one step of the interpreter
 
+    def run(planner: Planner) -> dict[int, Plan]:
+        return {k: planner.plan(p.demonstrated, p.start, p.goal, p.obstacles, seed=p.seed) for k, p in left}
+
+    planners = [Planner(arm, body, settings) for _ in range(min(workers, len(problems)))]
     with ThreadPoolExecutor(workers) as pool:
-        shares = list(pool.map(run, [problems[k::workers] for k in range(workers)]))
-    return [shares[k % workers][k // workers] for k in range(len(problems))]
+        found = {k: plan for plans in pool.map(run, planners) for k, plan in plans.items()}
+    return [found[k] for k in range(len(problems))]

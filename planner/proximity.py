@@ -15,6 +15,8 @@ from .jit import inlined, inner, kernel
 
 FAR = 1e30
 """Distance that is returned for what is beyond the cutoff."""
+TINY = 1e-300
+"""Added to squared lengths that are divided by."""
 
 
 @inlined
@@ -49,10 +51,8 @@ def _from_ball(rows, k, a, b):
     """Parameter of the segment's point nearest to a ball's center, and the vector from there, in the world."""
     p = (a[0] - rows[k, 2], a[1] - rows[k, 3], a[2] - rows[k, 4])
     d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-    length = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    t = 0.0
-    if length > 0.0:
-        t = clamped(-(p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) / length, 0.0, 1.0)
+    dd = max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], TINY)
+    t = clamped(-(p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) / dd, 0.0, 1.0)
     return t, (p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2])
 
 
@@ -60,7 +60,8 @@ def _from_ball(rows, k, a, b):
 def _from_capsule(rows, k, a, b):
     """Parameter of the segment's point nearest to a capsule's core, and the vector from there, in the world.
 
-    The core's points are `center + s axis`, s within the half length (Ericson 2005, 5.1.9, with a unit axis).
+    The core's points are `center + s axis`, s within the half length (Ericson 2005, 5.1.9, with a unit axis). Where
+    the two are parallel any t will do to start from. The divisions are free of what comes before: they overlap.
     """
     axis, h = (rows[k, 7], rows[k, 10], rows[k, 13]), rows[k, 16]
     p = (a[0] - rows[k, 2], a[1] - rows[k, 3], a[2] - rows[k, 4])
@@ -69,10 +70,9 @@ def _from_capsule(rows, k, a, b):
     da = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
     pd = p[0] * d[0] + p[1] * d[1] + p[2] * d[2]
     pa = p[0] * axis[0] + p[1] * axis[1] + p[2] * axis[2]
-    square = dd - da * da
-    t = clamped((da * pa - pd) / square, 0.0, 1.0) if square > 1e-14 * dd else 0.0
+    t = clamped((da * pa - pd) * (1.0 / max(dd - da * da, 1e-14 * dd + TINY)), 0.0, 1.0)
     s = clamped(pa + t * da, -h, h)
-    t = clamped((s * da - pd) / dd, 0.0, 1.0) if dd > 0.0 else 0.0
+    t = clamped((s * da - pd) * (1.0 / max(dd, TINY)), 0.0, 1.0)
     return t, (p[0] + t * d[0] - s * axis[0], p[1] + t * d[1] - s * axis[1], p[2] + t * d[2] - s * axis[2])
 
 
@@ -83,17 +83,12 @@ def _excess(x, half):
 
 
 @inner
-def _segment_box(p, d, hx, hy, hz):
-    """Parameter of the point of `p + t d` nearest to a box: the root of a rising, piecewise linear slope."""
-    slope = d[0] * _excess(p[0], hx) + d[1] * _excess(p[1], hy) + d[2] * _excess(p[2], hz)
-    if slope >= 0.0:
-        return 0.0
-    q = (p[0] + d[0], p[1] + d[1], p[2] + d[2])
-    end = d[0] * _excess(q[0], hx) + d[1] * _excess(q[1], hy) + d[2] * _excess(q[2], hz)
-    if end <= 0.0:
-        return 1.0
+def _segment_box(p, d, hx, hy, hz, t):
+    """Parameter of the point of `p + t d` nearest to a box: the root of a rising, piecewise linear slope.
+
+    It starts from where a straight line between the slopes at both ends crosses zero.
+    """
     low, high = 0.0, 1.0
-    t = slope / (slope - end)
     for _ in range(40):
         x, y, z = p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
         ex, ey, ez = _excess(x, hx), _excess(y, hy), _excess(z, hz)
@@ -162,10 +157,18 @@ def _way_out(rows, k, x, y, z):
 def _from_box(rows, k, a, b):
     """Parameter of the segment's point nearest to a box, and the vector from there, in the box's frame."""
     p, q = _into(rows, k, a), _into(rows, k, b)
+    hx, hy, hz = rows[k, 14], rows[k, 15], rows[k, 16]
     d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
-    t = _segment_box(p, d, rows[k, 14], rows[k, 15], rows[k, 16])
-    x, y, z = p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
-    return t, (_excess(x, rows[k, 14]), _excess(y, rows[k, 15]), _excess(z, rows[k, 16]))
+    e = (_excess(p[0], hx), _excess(p[1], hy), _excess(p[2], hz))
+    f = (_excess(q[0], hx), _excess(q[1], hy), _excess(q[2], hz))
+    slope, end = d[0] * e[0] + d[1] * e[1] + d[2] * e[2], d[0] * f[0] + d[1] * f[1] + d[2] * f[2]
+    if slope < 0.0 and end > 0.0:
+        t = _segment_box(p, d, hx, hy, hz, slope / (slope - end))
+        x, y, z = p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
+        return t, (_excess(x, hx), _excess(y, hy), _excess(z, hz))
+    # mostly an end is nearest; which one is as good as random, so it is selected, not branched to
+    last = slope < 0.0
+    return 1.0 if last else 0.0, (f[0] if last else e[0], f[1] if last else e[1], f[2] if last else e[2])
 
 
 @inner
@@ -213,7 +216,8 @@ def closest(rows, k, vertices, a, b):
         t, v, proven = _from_other(rows, k, vertices, a, b)
     length = _length(v)
     if length > 1e-12:
-        unit = (v[0] / length, v[1] / length, v[2] / length)
+        scale = 1.0 / length
+        unit = (scale * v[0], scale * v[1], scale * v[2])
         normal = unit if kind <= 1.0 else _turned(rows, k, unit)
     else:
         p = _into(rows, k, (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])))

@@ -80,6 +80,18 @@ def _most_violated(rows, count, x, n):
     return worst
 
 
+@kernel
+def all_hold(rows, count, x, n):
+    """True if x violates no row: then `solve` would leave it as it is, and needs no W for it."""
+    for k in range(count):
+        value = -rows[k, BOUND]
+        for i in range(n):
+            value += rows[k, i] * x[i]
+        if value < -TOLERANCE:
+            return False
+    return True
+
+
 @inner
 def _inner(rows, i, j, n):
     """`a_i^T W^-1 a_j`, with the slack's share."""

@@ -1,85 +1,45 @@
 """Algorithm 1 as one step: measured joints and obstacles in, a safe command out, replanned when the world changes.
 
-Static obstacles are planned round as soon as they are seen. Moving ones are left to the safety layer and to waiting
-at first, since most of them go away by themselves; only what stays in the way is planned round, at its present place.
-Not in the paper: waiting, the whole arm, giving up with a reason.
+Static obstacles are planned round as soon as they are seen. What moves is foreseen with its velocity: to go on guarded,
+to wait or to go round is decided by which of them arrives first. What stays in the way for long is planned round at its
+present place. Not in the paper: foresight, waiting, the whole arm, giving up with a reason.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import dualquat as dq
 from .arm import Arm
 from .body import Body
-from .clearance import room_at, room_of_near
-from .errors import BadOption
+from .clearance import room_of_near
+from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
+from .foresight import HAIR, Ahead, Foresight, moves, nearest, same_scene, swept, windows
 from .guarded import guarded_tick
-from .planning import Planner, PlanSettings
-from .pose import METERS_PER_RADIAN, Pose, PosePath
+from .planning import Planner
+from .plans import Plan
+from .pose import Pose, PosePath
 from .pursuit import ARRIVED, INDEX, WAITED
+from .repet import MAX_OBSTACLES
 from .safety import BLOCKED as UNSAFE
 from .safety import safe_velocity
 from .scene_work import Layout, SceneWork
 from .shapes import Obstacle, Sphere
 from .workspace import PURSUIT, bound
 
-FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
-    "following", "escaping", "waiting", "blocked", "done", "failed",
-)  # fmt: skip
-STATES = (FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED)
-STILL = 1e-4
-"""Speed [m/s] up to which an obstacle stands still."""
-SAME_PLACE = 1e-3
-"""Way [m], or turn in screw length, of a standing obstacle that is a change of the scene."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReactiveSettings:
-    """How a leg is followed among obstacles that come and go.
-
-    Attributes:
-        plan: how it is planned; `plan.motion.dt` is the time step.
-        horizon: seconds for which obstacles are foreseen with their velocity; 0: not at all.
-        patience: seconds without progress after which it is planned anew, with what moves as if it stood still.
-        give_up: seconds without progress in all after which the leg has failed.
-        lead: seconds that the safety layer looks at moving obstacles ahead of time, for an arm that lags.
-    """
-
-    plan: PlanSettings = field(default_factory=PlanSettings)
-    horizon: float = 0.6
-    patience: float = 1.5
-    give_up: float = 40.0
-    lead: float = 0.05
-
-    def __post_init__(self):
-        for name in ("horizon", "lead"):
-            if not 0 <= getattr(self, name) < 60:
-                raise BadOption(name, f"{getattr(self, name)} is not from 0 to 60 s")
-        if not 0 < self.patience <= self.give_up < math.inf:
-            raise BadOption("patience", f"need 0 < patience <= give_up, got {self.patience} and {self.give_up}")
-
-
-class Command(NamedTuple):
-    """What to do now.
-
-    Attributes:
-        velocity: (dof,) joint speeds [rad/s or m/s].
-        state: one of `STATES`.
-        reason: why, where the state is "blocked" or "failed".
-        room: smallest distance of a close pair less what it must keep [m]; inf if nothing is close.
-    """
-
-    velocity: np.ndarray
-    state: str
-    reason: str
-    room: float
+BLOCKING = ("start in collision", "goal in collision", "no escape found", "node limit reached")
+"""Reasons of a plan that say: something is in the way."""
+DECIDE = 0.2
+"""Seconds for which a decision to go on, to wait or to go round holds."""
+WAITS = (0.25, 0.5, 1.0)
+"""How long to wait, in parts of the horizon, is what is compared."""
+GAIN = 0.3
+"""Seconds by which waiting or a detour must arrive sooner than going on."""
+HELD_BACK = 0.1
+"""Part of the wanted speed below which an arm that something moving is close to is waiting."""
 
 
 class ReactivePlanner:
@@ -100,6 +60,10 @@ class ReactivePlanner:
         self._path: PosePath | None = None
         self._memory = np.zeros(4)
         self._planner = Planner(arm, body, self._leg_settings)
+        # no tick waits for a search while something moves
+        self._quick = Planner(arm, body, replace(self._leg_settings, search=None, effort=0))
+        pace = motion.pursuit.capture_radius * motion.controller.gain
+        self._foresight = Foresight(self._work, motion.dt, self.settings.horizon, pace)
         self.hold(body)
         self.see(())
         self.stop()
@@ -108,6 +72,7 @@ class ReactivePlanner:
         """The body from now on: after something was grasped or released."""
         self.body = body
         self._planner.hold(body)
+        self._quick.hold(body)
         self._layout = Layout(self.arm, body, self.settings.plan.safety, self.settings.plan.motion.dt)
         self._bind()
 
@@ -115,7 +80,7 @@ class ReactivePlanner:
         """What is around now, by measured place and velocity; and which contacts are wanted."""
         if obstacles is self._obstacles and allowed is self._allowed and not self._moving:
             return
-        changed = tuple(allowed) != self._allowed or not _same_scene(self._obstacles, obstacles)
+        changed = tuple(allowed) != self._allowed or not same_scene(self._obstacles, obstacles)
         self._obstacles, self._allowed = tuple(obstacles), tuple(allowed)
         if changed:
             self._bind()
@@ -135,14 +100,15 @@ class ReactivePlanner:
         self._work[PURSUIT, : len(packed)] = packed
         self._restart(path)
         self._done = self._reached = 0
-        self._lost, self._tries, self.reason, self._detour = 0.0, 0, "", False
+        self._lost, self._tries, self.reason, self.detail, self._detour = 0.0, 0, "", "", False
+        self._why_not = "", ""
         self._plan_now = bool(self._obstacles)
         self.state = FOLLOWING
 
     def stop(self) -> None:
         """No leg: stand still, retreating from what comes too close."""
         self._nominal = self._path = None
-        self._plan_now, self.state, self.reason = False, DONE, ""
+        self._plan_now, self.state, self.reason, self.detail = False, DONE, "", ""
 
     @property
     def path(self) -> PosePath | None:
@@ -155,7 +121,7 @@ class ReactivePlanner:
         if self._path is None or self.state in (DONE, FAILED):
             return self._stand(joints, self.state)
         if self._plan_now:
-            self._replan(joints, [o for o in self._obstacles if not _moves(o)])
+            self._replan(joints, [o for o in self._obstacles if not moves(o)])
         if self._joints is not None:
             return self._step_joints(joints)
         path = self._path
@@ -166,9 +132,55 @@ class ReactivePlanner:
         if status == ARRIVED:
             self.state = DONE
             return self._stand(joints, DONE)
-        if self._moving and self._better_waits(joints):
-            return self._waited(joints, self._stand(joints, WAITING))
+        if self._moving and self.settings.horizon > 0.0:
+            self._decided -= dt
+            if self._decided <= 0.0:
+                self._decide(joints)
+            if self._waiting:
+                return self._waited(joints, self._stand(joints, WAITING))
         return self._waited(joints, self._command(self._following(), safety))
+
+    def _decide(self, q: np.ndarray) -> None:
+        """Go on, wait, or go round what moves: whatever is safe, and of that what arrives first."""
+        assert self._path is not None
+        self._waiting, self._decided = False, DECIDE
+        horizon, robot = self.settings.horizon, self._scene.robot
+        best = self._foresight.ahead(robot, self._path, self._memory, q)
+        if best.conflict is None:
+            return
+        conflict, way = best.conflict, None
+        for part in WAITS:
+            other = self._foresight.ahead(robot, self._path, self._memory, q, part * horizon)
+            if _is_better(other, best):
+                best, self._waiting = other, True
+        for plan in self._detours(q, conflict):
+            other = self._foresight.ahead(robot, plan.path, fresh_memory(), q)
+            if _is_better(other, best):
+                best, way, self._waiting = other, plan, False
+        if way is not None:
+            self._reached, self._detour = self._now_at(q), True
+            self._restart(way.path)
+            self._decided = DECIDE
+
+    def _detours(self, q: np.ndarray, conflict: float) -> Iterator[Plan]:
+        """Ways round where what moves will be, past it before or behind."""
+        assert self._nominal is not None
+        rest = self._nominal[self._now_at(q) :]
+        still = [obstacle for obstacle in self._obstacles if not moves(obstacle)]
+        for start, end in windows(conflict, self.settings.horizon):
+            # where it is about to leave the arm or the goal alone, the roll-out tells whether it does in time
+            places = [place for place in swept(self._obstacles, start, end) if self._spares_ends(place, q, rest[-1])]
+            around = still + places
+            if len(around) <= MAX_OBSTACLES:
+                allowed = self._known_allowed(around)
+                plan = self._quick.plan(rest, q, rest[-1], around, allowed=allowed, seed=self._tries)
+                if plan.how == "escape":
+                    yield plan
+
+    def _spares_ends(self, place: Obstacle, q: np.ndarray, goal: Pose) -> bool:
+        settings = self.settings.plan
+        alone = SceneWork(self._layout, [place], settings.repet.distance, self._known_allowed([place]))
+        return min(alone.room(q), alone.tool_room(goal)) > settings.repet.distance - settings.safety.distance
 
     def _following(self) -> str:
         return ESCAPING if self._detour else FOLLOWING
@@ -190,48 +202,49 @@ class ReactivePlanner:
     def _command(self, state: str, safety: int) -> Command:
         room = float(room_of_near(self._scene.robot, -1, 0.0))
         if safety == UNSAFE:
-            return Command(self._out.copy(), BLOCKED, "an obstacle comes closer than the arm can keep away", room)
+            why = "an obstacle comes closer than the arm can keep away"
+            return Command(self._out.copy(), BLOCKED, why, room, str(self._scene.tightest_seen() or ""))
+        if (
+            self._moving
+            and np.abs(self._out).max() < HELD_BACK * np.abs(self._wish).max()
+            and self._scene.meets_mover()
+        ):
+            state = WAITING
         return Command(self._out.copy(), state, "", room)
 
     def _stand(self, q: np.ndarray, state: str) -> Command:
         dt = self.settings.plan.motion.dt
         command = self._command(state, safe_velocity(self._scene.robot, q, self._still, dt, self._out))
-        return command._replace(state=state, reason=self.reason) if state in (DONE, FAILED) else command
+        if state in (DONE, FAILED):
+            return command._replace(state=state, reason=self.reason, detail=self.detail)
+        return command._replace(state=state) if command.state != BLOCKED else command
 
     def _waited(self, q: np.ndarray, command: Command) -> Command:
         """The command, after looking at how long nothing has got on: plan anew, or give up."""
-        if command.state == WAITING:
-            self._memory[WAITED] += self.settings.plan.motion.dt
         waited = self._memory[WAITED]
         if waited > self.settings.patience:
             self._lost += waited
             if self._lost > self.settings.give_up or (not self._moving and self._tries >= 3):
-                self.state, self.reason = FAILED, self._why(q)
+                self.state, (self.reason, self.detail) = FAILED, self._why()
                 return self._stand(q, FAILED)
             self._tries += 1
             self._replan(q, self._obstacles)
             self._memory[WAITED] = 0.0
         return command
 
-    def _why(self, q: np.ndarray) -> str:
-        if room_of_near(self._scene.robot, -1, 0.0) < self.settings.plan.safety.distance:
-            return "blocked"
-        return "ik_or_limit"
-
-    def _better_waits(self, q: np.ndarray) -> bool:
-        """True if going on would come too close within the horizon, but standing still would not."""
-        robot, seconds = self._scene.robot, self.settings.horizon
-        going = staying = math.inf
-        for part in (0.25, 0.5, 0.75, 1.0):
-            going = min(going, room_at(robot, q + part * seconds * self._wish, part * seconds, 0.1))
-            staying = min(staying, room_at(robot, q, part * seconds, 0.1))
-        return going < 0.0 <= staying
+    def _why(self) -> tuple[str, str]:
+        """Why it does not get on, as a reason and what is in the way of what."""
+        tight = self._scene.tightest_seen()
+        if tight is not None and tight.gap - tight.keep < self.settings.plan.safety.distance:
+            return "blocked", str(tight)
+        reason, detail = self._why_not
+        return ("blocked", detail) if reason in BLOCKING else ("ik_or_limit", "")
 
     def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
         """Lead the rest of the leg round obstacles taken to stand still; where that fails the path stays."""
         self._plan_now = False
         assert self._nominal is not None
-        self._reached = self._nearest(q) if self._detour else self._reached + int(self._memory[INDEX])
+        self._reached = self._now_at(q)
         rest = self._nominal[self._reached :]
         allowed = self._known_allowed(obstacles)
         plan = self._planner.plan(rest, q, rest[-1], obstacles, allowed=allowed, onward=self._onward, seed=self._tries)
@@ -242,24 +255,25 @@ class ReactivePlanner:
             self._path = plan.path
         else:
             self._path = rest if self._reached else self._nominal
-            self.reason = plan.reason
+        self._why_not = plan.reason, plan.detail
         self._restart(self._path)
 
-    def _nearest(self, q: np.ndarray) -> int:
-        """Index of the leg's pose, from the last such one on, that is nearest to the tool."""
+    def _now_at(self, q: np.ndarray) -> int:
+        """Index of the leg's pose that is followed now; on a detour the one, from the last such, next to the tool."""
         assert self._nominal is not None
-        path = self._nominal.dqs[self._reached :]
-        distance, angle = dq.gap(self.arm.fk(q).dq[None], path)
-        return self._reached + int(np.argmin(np.hypot(distance, METERS_PER_RADIAN * angle)))
+        if self._detour:
+            return self._reached + nearest(self._nominal[self._reached :], self.arm.fk(q))
+        return self._reached + int(self._memory[INDEX])
 
     def _restart(self, path: PosePath) -> None:
-        self._path, self._memory = path, np.array([0.0, 0.0, np.inf, 0.0])
+        self._path, self._memory = path, fresh_memory()
+        self._decided, self._waiting = 0.0, False
 
     def _ahead(self) -> list[Obstacle]:
-        return [o.at(self.settings.lead) if _moves(o) else o for o in self._obstacles]
+        return [o.at(self.settings.lead) if moves(o) else o for o in self._obstacles]
 
     def _bind(self) -> None:
-        self._moving = any(_moves(o) for o in self._obstacles)
+        self._moving = any(moves(o) for o in self._obstacles)
         distance = self.settings.plan.repet.distance
         self._scene = SceneWork(self._layout, self._ahead(), distance, self._known_allowed(self._obstacles))
 
@@ -269,22 +283,16 @@ class ReactivePlanner:
         return [pair for pair in self._allowed if pair[0] in self.body.names and pair[1] in names]
 
 
-def _moves(obstacle: Obstacle) -> bool:
-    return float(np.abs(obstacle.velocity).max()) > STILL
+def _is_better(one: Ahead, other: Ahead) -> bool:
+    """True if one is safe and the other is not; arrives sooner, if both are; has more room, if none is."""
+    if one.safe != other.safe:
+        return one.safe
+    return one.arrival + GAIN < other.arrival if one.safe else one.room > other.room + HAIR
 
 
-def _same_scene(before: Sequence[Obstacle], now: Sequence[Obstacle]) -> bool:
-    """True if the same obstacles are there, those that stand still in the same places."""
-    if len(before) != len(now):
-        return False
-    for old, new in zip(before, now, strict=True):
-        if old.name != new.name or old.shape != new.shape or old.margin != new.margin or _moves(old) != _moves(new):
-            return False
-        if not _moves(new):
-            distance, angle = old.pose.gap(new.pose)
-            if math.hypot(distance, METERS_PER_RADIAN * angle) > SAME_PLACE:
-                return False
-    return True
+def fresh_memory() -> np.ndarray:
+    """Of a pursuit that has not begun."""
+    return np.array([0.0, 0.0, np.inf, 0.0])
 
 
 def warm_up(arm: Arm, body: Body) -> None:

@@ -1,86 +1,103 @@
-"""Plans made smooth: what a curve or a time law changes is proven clear again, or refused.
+"""Motions made smooth: what a curve or a time law changes is proven clear again, or refused.
 
 Not in the paper, which names smooth curves as future work.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arm import Arm
-from .body import Body
-from .edges import is_clear, tool_work
+from .edges import is_clear
 from .errors import PlanFailed
+from .guarded import guarded_roll_out
 from .joint_search import joint_edge_is_clear
-from .planning import Plan, PlanSettings
 from .pose import PosePath
+from .pursuit import ARRIVED
 from .scene_work import SceneWork
-from .shapes import Obstacle, pack
-from .smooth import smooth_path
+from .smooth import smooth, thinned
 from .timing import TimedPath, timed
 
+SMOOTH_TOLERANCE = 0.002
+"""Screw length [m] by which a path may be thinned before a curve is laid through it: the trembling of a hand."""
+CURVE_SPACING = 0.005
+"""Screw length [m] between poses of a curve."""
 
-def retimed(
-    plan: Plan,
-    acceleration_limits: ArrayLike,
-    arm: Arm,
-    body: Body,
-    obstacles: Sequence[Obstacle],
-    settings: PlanSettings | None = None,
-    *,
-    allowed: Sequence[tuple[str, str]] = (),
-) -> TimedPath:
-    """The plan's joints on a C2 spline, as fast as velocity and acceleration limits allow, from rest to rest.
+
+def retimed(joints: np.ndarray, dt: float, acceleration_limits: ArrayLike, arm: Arm, scene: SceneWork) -> TimedPath:
+    """Joints (t, dof) on a C2 spline, as fast as velocity and acceleration limits allow, from rest to rest.
 
     Args:
-        plan: with success.
+        joints: proven clear as they are.
+        dt: seconds between samples of the result.
         acceleration_limits: (dof,) or one number [rad/s^2].
-        arm: of the plan.
-        body: of the plan.
-        obstacles: of the plan.
-        settings: of the plan.
-        allowed: of the plan.
+        arm: whose joints these are.
+        scene: it among the obstacles.
 
     Raises:
-        PlanFailed: "plan_failed", there is no plan, or the spline between its points is not clear.
+        PlanFailed: "plan_failed", the spline between the joints is not clear.
     """
-    if not plan.success:
-        raise PlanFailed("plan_failed", f"there is no plan to time: {plan.reason}")
-    settings = settings or PlanSettings()
     limits = np.broadcast_to(np.asarray(acceleration_limits, dtype=np.float64), (arm.dof,))
-    result = timed(plan.joints, arm.velocity_limits, limits, plan.dt)
-    robot = SceneWork.of(arm, body, obstacles, settings, allowed).robot
+    result = timed(joints, arm.velocity_limits, limits, dt)
     for k, (a, b) in enumerate(pairwise(result.joints)):
-        if not joint_edge_is_clear(robot, np.ascontiguousarray(a), np.ascontiguousarray(b)):
+        if not joint_edge_is_clear(scene.robot, np.ascontiguousarray(a), np.ascontiguousarray(b)):
             detail = f"the timed motion is not clear at {result.time[k]:.2f} s: the spline leaves the plan there"
             raise PlanFailed("plan_failed", detail)
     return result
 
 
 def smooth_clear_path(
-    path: PosePath, tool: np.ndarray, obstacles: Sequence[Obstacle], distance: float, *, per_segment: int = 4
+    path: PosePath, tool: np.ndarray, widest: float, *, tolerance: float = 0.0, spacing: float = CURVE_SPACING
 ) -> PosePath:
-    """A C1 dual-quaternion curve through a tool path, every edge of it proven clear.
+    """A C1 dual-quaternion curve along a tool path, every edge of it proven clear.
 
     Args:
         path: proven clear as it is, like `Escape.path`.
-        tool: (m, 7) capsules, see `Body.tool`.
-        obstacles: that stand still.
-        distance: to keep [m] from those without a margin of their own.
-        per_segment: poses of the curve per pose of the path.
+        tool: the tool among obstacles, see `edges.tool_work`.
+        widest: largest distance to keep [m] in it.
+        tolerance: screw length [m] that poses of the path may be away from those the curve is laid through.
+        spacing: screw length [m] between poses of the curve.
 
     Raises:
         PlanFailed: "plan_failed", the curve is not clear somewhere.
     """
-    curve = smooth_path(path, per_segment=per_segment)
-    work = tool_work(tool, pack(obstacles), margin=distance)
-    widest = max([distance, *(o.margin for o in obstacles if o.margin is not None)])
-    poses = [tuple(float(v) for v in row) for row in curve.dqs]
+    curve = smooth(thinned(path, tolerance))
+    steps = max(1, math.ceil(curve.knots[-1] / spacing))
+    result = PosePath(curve.poses(np.linspace(0.0, curve.knots[-1], steps + 1)))
+    poses = [tuple(float(v) for v in row) for row in result.dqs]
     for k, (a, b) in enumerate(pairwise(poses)):
-        if not is_clear(work, a, b, widest):
+        if not is_clear(tool, a, b, widest):
             raise PlanFailed("plan_failed", f"the smooth path is not clear behind pose {k} of {len(poses)}")
-    return curve
+    return result
+
+
+def smoothed(
+    path: PosePath, start: np.ndarray, scene: SceneWork, work: np.ndarray, dt: float, seconds: float, tolerance: float
+) -> tuple[PosePath, np.ndarray, float, int]:
+    """A motion along a smooth path: the curve, the joints of every tick, smallest joint margin, ticks changed.
+
+    Args:
+        path: of the tcp, from where it is.
+        start: (dof,) joints.
+        scene: the arm among the obstacles.
+        work: the arm, controller and pursuit, see `workspace`.
+        dt: seconds per tick.
+        seconds: longest motion.
+        tolerance: see `smooth_clear_path`.
+
+    Raises:
+        PlanFailed: "plan_failed", the curve is not clear, or the arm does not follow it to its end.
+    """
+    curve = smooth_clear_path(path, scene.safe_tool(), scene.widest_safe, tolerance=tolerance)
+    dof, memory = len(start), np.array([0.0, 0.0, np.inf, 0.0])
+    trace = np.empty((round(seconds / dt) + 1, dof))
+    status, last, margin, changed = guarded_roll_out(
+        work, scene.robot, curve.dqs, start.copy(), dt, memory, np.empty(dof), np.empty(dof), trace, 0
+    )
+    if status != ARRIVED:
+        raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * dt:.2f} s")
+    return curve, trace[: last + 1].copy(), float(margin), int(changed)

@@ -15,7 +15,17 @@ import numpy as np
 
 from .edges import tool_work
 from .errors import BadOption, BadShape
-from .escape import ESCAPED, FREE, GOAL_IN_COLLISION, NO_ESCAPE, START_IN_COLLISION, TOO_LONG, escape
+from .escape import (
+    ESCAPED,
+    FREE,
+    GOAL_IN_COLLISION,
+    NO_ESCAPE,
+    NODE_LIMIT,
+    START_IN_COLLISION,
+    TOO_LONG,
+    escape,
+    last_tree,
+)
 from .escape_tree import (
     BIAS,
     EXPANDED,
@@ -38,6 +48,7 @@ REASONS = {
     START_IN_COLLISION: "start in collision",
     GOAL_IN_COLLISION: "goal in collision",
     NO_ESCAPE: "no escape found",
+    NODE_LIMIT: "node limit reached",
     TOO_LONG: "the detours do not fit into the longest path allowed",
 }
 VERDICTS = ("kept", "edge not clear", "visited", "outside the workspace", "sees the path again")
@@ -97,7 +108,7 @@ class RepetSettings:
     random: int = 8
     away: float = 1.0
     candidates: int = 5
-    cell: float = 0.5
+    cell: float = 1.0
     nodes: int = 4000
     rounds: int = 10
     shortcut: bool = True
@@ -264,8 +275,8 @@ def escape_path(
         np.zeros((settings.candidates, 8)), np.zeros((settings.levels + 3, 8)), tree, cells, heap, options,
         np.array([float(seed % 2147483646) + 1.0]), log,
     )  # fmt: skip
-    rows = int(log[:, 0].max())
-    grown = EscapeTree.from_rows(tree[: int(log[max(detours - 1, 0), 0])]) if rows else None
+    rows = int(log[last_tree(status, detours, len(log)), 0])
+    grown = EscapeTree.from_rows(tree[:rows]) if rows else None
     if status == FREE:
         return Escape(path, "", (), None)
     if status != ESCAPED:

@@ -13,6 +13,7 @@ Python cheap and nothing is allocated in a loop. One per thread.
 | PREVIOUS, DESIRED | the speeds that were commanded last, that are wanted now |
 | LEVERS | per joint: no point that it moves is ever farther from its axis [m] |
 | SEEN | joints at the last look at everything, then the smallest room then, 1 if it counts, 1 if obstacles move |
+| POSED | joints that the frames belong to |
 | TCPS | per arm: pose of its tcp |
 | CHAINS, FRAMES | see `chain`; the frame of joint j is row FRAMES + j |
 | BODY | per capsule: arm, joint whose frame it moves with (-1: none), ends in that frame, radius, ball that holds it |
@@ -43,7 +44,7 @@ WIDTH = 40
 MAX_ARMS, MAX_JOINTS, MAX_CAPSULES = 2, 16, 52
 HEADER, SETTINGS, ARMS, LOW, HIGH, SPEED = 0, 1, 2, 3, 4, 5
 STEP, WISH, PART, AFTER, BEFORE, ACTIVE, PREVIOUS = 6, 7, 8, 9, 10, 11, 12
-SLIDING, TCPS, WEIGHT, CHAINS, DESIRED, LEVERS, SEEN = 13, 14, 16, 32, 60, 61, 62
+SLIDING, TCPS, WEIGHT, CHAINS, DESIRED, LEVERS, SEEN, POSED = 13, 14, 16, 32, 60, 61, 62, 63
 FRAMES, BODY, WORLD, NEXT, FACTOR, OBSTACLES = 64, 84, 136, 188, 240, 272
 # columns of the header
 N_ARMS, N_JOINTS, N_CAPSULES, N_OBSTACLES, N_PAIRS, N_NEAR, PAIRS, NEAR, BOUNDS, VERTICES = range(10)
@@ -88,6 +89,7 @@ def robot_work(
     work[HEADER, :5] = len(arms), joints, count, 0, len(pairs)
     work[HEADER, PAIRS] = OBSTACLES
     work[SETTINGS, : len(settings)] = settings
+    work[POSED] = np.nan
     if len(pairs):
         work[OBSTACLES:, :2] = pairs
     _lay_arms(work, arms, bodies)
@@ -149,7 +151,13 @@ def lay_capsules(rows: np.ndarray, capsules: np.ndarray) -> None:
 
 @kernel
 def pose_arms(g, q):
-    """Forward kinematics of all arms at q (joints,): their frames into the rows FRAMES."""
+    """Forward kinematics of all arms at q (joints,): their frames into the rows FRAMES, if they are not there yet."""
+    posed = True
+    for i in range(len(q)):
+        posed &= g[POSED, i] == q[i]
+        g[POSED, i] = q[i]
+    if posed:
+        return
     for k in range(int(g[HEADER, N_ARMS])):
         first, dof, chain = int(g[ARMS, 3 * k]), int(g[ARMS, 3 * k + 1]), int(g[ARMS, 3 * k + 2])
         x = forward(g[chain : chain + dof + 1], q[first : first + dof], g[FRAMES + first : FRAMES + first + dof])

@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .arm import Arm
 from .body import FRAME, Body
-from .clearance import room_at
+from .clearance import FIRST, GAP, KEEP, KIND, OTHER, SELF_MARGIN, find_near, room_at
 from .edges import tool_room, tool_work
 from .errors import BadOption
 from .pose import Pose
 from .repet import MAX_OBSTACLES
-from .robot_work import MARGIN, OBSTACLES, SEEN, SEEN_COUNTS, SEEN_MOVING, among, robot_work
+from .robot_work import (
+    FRAMES,
+    HEADER,
+    MARGIN,
+    N_NEAR,
+    N_OBSTACLES,
+    NEAR,
+    OBSTACLES,
+    SEEN,
+    SEEN_COUNTS,
+    SEEN_MOVING,
+    SETTINGS,
+    WORLD,
+    among,
+    place_capsules,
+    place_frames,
+    robot_work,
+)
 from .safety import SafetySettings, contact_masks
 from .shapes import Obstacle, pack
 
 if TYPE_CHECKING:
-    from .planning import PlanSettings
+    from .plans import PlanSettings
 
 
 def checked_obstacles(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
@@ -33,6 +50,28 @@ PLACE = slice(2, 20)
 """Columns of an obstacle that change when it moves."""
 
 
+class Tightest(NamedTuple):
+    """The pair that has least room.
+
+    Attributes:
+        part: name of the part of the body, or of what it holds.
+        other: name of the obstacle, or of another part; "obstacle 3", counted from 0, if it has none.
+        gap: distance between them [m], negative inside.
+        keep: distance that they must keep [m].
+    """
+
+    part: str
+    other: str
+    gap: float
+    keep: float
+
+    def __str__(self) -> str:
+        """For messages."""
+        if self.gap <= 0.0:
+            return f"{self.part} touches {self.other}"
+        return f"{self.part} is {1e3 * self.gap:.1f} mm from {self.other}, which must be {1e3 * self.keep:.1f}"
+
+
 class Layout:
     """What of the work arrays belongs to the arm and its body: made once, copied for every scene."""
 
@@ -40,6 +79,7 @@ class Layout:
         nothing = pack(())
         self.names, self.safety = body.names, safety
         self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
+        self.tool_names = tuple(body.names[row] for row in self.at_tool)
         self.robot = robot_work((arm,), (body,), nothing, settings=safety.packed(dt))
         self.tool = tool_work(body.tool(arm), nothing)
 
@@ -62,6 +102,8 @@ class SceneWork:
         allowed: Sequence[tuple[str, str]] = (),
     ):
         packed, self._distance = pack(obstacles), distance
+        self._layout = layout
+        self._names = [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(obstacles)]
         masks = contact_masks(layout.names, obstacles, allowed)
         self.robot = among(layout.robot, packed, masks, layout.safety.distance)
         tool_masks = [sum(1 << k for k, row in enumerate(layout.at_tool) if mask >> int(row) & 1) for mask in masks]
@@ -104,6 +146,55 @@ class SceneWork:
 
     def tool_room(self, pose: Pose) -> float:
         """Room [m] of the tool at a pose of the tcp, with the safety distance, up to 1 m."""
-        factor = self.robot_distance / self._distance if self._distance > 0 else 1.0
-        work = self.tool(factor)
-        return float(tool_room(work, tuple(float(value) for value in pose.dq), 1.0))
+        return float(tool_room(self.safe_tool(), tuple(float(value) for value in pose.dq), 1.0))
+
+    def safe_tool(self) -> np.ndarray:
+        """The tool's array with the safety distance in place of the planning distance."""
+        return self.tool(self._safe_factor)
+
+    @property
+    def widest_safe(self) -> float:
+        """Largest distance to keep [m] in `safe_tool`."""
+        return self.widest(self._safe_factor)
+
+    @property
+    def _safe_factor(self) -> float:
+        return self.robot_distance / self._distance if self._distance > 0 else 1.0
+
+    def tightest(self, q: np.ndarray) -> Tightest | None:
+        """The pair of the whole arm with least room at joints q (dof,); None if nothing is within its distance."""
+        place_capsules(self.robot, q, WORLD)
+        return self._tightest(self.robot, self._layout.names)
+
+    def tightest_of_tool(self, pose: Pose, factor: float | None = None) -> Tightest | None:
+        """The pair of the tool with least room at a pose; with the safety distance, or a factor of the planning one."""
+        work = self.safe_tool() if factor is None else self.tool(factor)
+        work[FRAMES, 3:6], work[FRAMES, 6:10] = pose.position, pose.dq[:4]
+        place_frames(work, WORLD)
+        return self._tightest(work, self._layout.tool_names)
+
+    def meets_mover(self) -> bool:
+        """True if an obstacle that moves is among the near pairs of the whole arm that were found last."""
+        near = self._near(self.robot)
+        others = near[near[:, KIND] == 0.0, OTHER].astype(int)
+        return bool(self.robot[OBSTACLES + others, 17:20].any())
+
+    @staticmethod
+    def _near(work: np.ndarray) -> np.ndarray:
+        first = int(work[HEADER, NEAR])
+        return work[first : first + int(work[HEADER, N_NEAR])]
+
+    def _tightest(self, work: np.ndarray, names: Sequence[str]) -> Tightest | None:
+        margins = work[OBSTACLES : OBSTACLES + int(work[HEADER, N_OBSTACLES]), MARGIN]
+        find_near(work, max([work[SETTINGS, SELF_MARGIN], *margins]))
+        return self.tightest_seen(work, names)
+
+    def tightest_seen(self, work: np.ndarray | None = None, names: Sequence[str] = ()) -> Tightest | None:
+        """The same of the near pairs that were found last; None if there were none."""
+        work, names = (self.robot, self._layout.names) if work is None else (work, names)
+        near = self._near(work)
+        if not len(near):
+            return None
+        row = near[np.argmin(near[:, GAP] - near[:, KEEP])]
+        others = self._names if row[KIND] == 0.0 else names
+        return Tightest(names[int(row[FIRST])], others[int(row[OTHER])], float(row[GAP]), float(row[KEEP]))

@@ -25,7 +25,8 @@ def _unit(v):
     length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     if length < 1e-12:
         return (0.0, 0.0, 0.0)
-    return (v[0] / length, v[1] / length, v[2] / length)
+    scale = 1.0 / length
+    return (scale * v[0], scale * v[1], scale * v[2])
 
 
 @inlined

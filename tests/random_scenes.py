@@ -31,7 +31,8 @@ from onedemo.planner.ik import inverse_kinematics
 from onedemo.planner.joint_search import connect
 from onedemo.planner.models import turn_z_to
 from onedemo.planner.motion_log import MotionLog
-from onedemo.planner.planning import Plan, Planner, PlanSettings
+from onedemo.planner.planning import Planner
+from onedemo.planner.plans import Plan, PlanSettings
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.scene_work import SceneWork
 from onedemo.planner.segment import resampled, trimmed

@@ -42,7 +42,7 @@ VARIANTS = {
     "grow = shrink = 1": {"grow": 1.0, "shrink": 1.0},
     "candidates = 1": {"candidates": 1},
     "cell = 0.25": {"cell": 0.25},
-    "cell = 1": {"cell": 1.0},
+    "cell = 0.5": {"cell": 0.5},
     "nodes = 400": {"nodes": 400},
     "nodes = 20000": {"nodes": 20_000},
     "rounds = 1": {"rounds": 1},

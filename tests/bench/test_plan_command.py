@@ -18,7 +18,7 @@ from onedemo.planner.certify import certify
 from onedemo.planner.errors import BadConfig, UnknownName
 from onedemo.planner.motion_log import digest_of, read_log
 from onedemo.planner.pose import Pose
-from onedemo.planner.shapes import Box, Capsule, Cylinder, Mesh, Sphere
+from onedemo.planner.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
 
 DETOURS = ("sphere", "wall_gap", "shelf", "clutter")
 FOUND = ("free", *DETOURS)
@@ -70,7 +70,7 @@ def test_a_cage_is_an_honest_failure(capsys, tmp_path):
     code = run_plan("cage", [], tmp_path / "cage.png", tmp_path / "cage.json")
     said = capsys.readouterr()
     assert code == NOT_FOUND
-    assert "not found   cage: no escape found" in said.out
+    assert "not found   cage: node limit reached: a tree had 4000 nodes, see repet.nodes; in" in said.out
     assert "judged" not in said.out
     assert "there is no plan" in said.err
     assert not (tmp_path / "cage.json").exists()
@@ -90,6 +90,40 @@ def test_the_lines_tell_what_was_found(capsys):
     # a sample may be a little farther than the closest moment between samples
     assert spare - 0.1 < float(lines[1].split()[1]) < spare + 1.0
     assert lines[3].startswith("not judged")
+
+
+def test_a_reason_names_part_and_obstacle(capsys):
+    assert run_plan("sphere", ["goal=[0.0, 0.0, 0.83, 0, 1, 0, 0]"], None, None) == NOT_FOUND
+    out = capsys.readouterr().out
+    assert "not found   sphere: goal in collision: hand touches ball; in" in out
+
+
+@pytest.mark.parametrize("smooth, timed", [(True, False), (False, True), (True, True)])
+def test_a_plan_is_refined_and_what_is_written_is_the_refined_one(smooth, timed, capsys, tmp_path):
+    files = tmp_path / "plan.png", tmp_path / "plan.json"
+    assert run_plan("sphere", [], *files, smooth=smooth, timed=timed) == 0
+    lines = capsys.readouterr().out.splitlines()
+    words = ["smooth"] * smooth + ["timed"] * timed
+    assert f"by escape trees, {', '.join(words)}, in " in lines[0]
+    assert ("of the speed limits and up to 5 rad/s^2" in lines[2]) == timed
+    assert lines[3].startswith("judged      sound")
+    plain, log = planned("sphere"), read_log(files[1])
+    assert certify(log).ok and digest_of(log) != digest_of(plain.log)
+    result = plain.plan.smoothed() if smooth else plain.plan
+    result = result.timed() if timed else result
+    np.testing.assert_array_equal(log.joints, result.joints)
+    assert f"takes {result.dt * (len(result.joints) - 1):.1f} s" in lines[0]
+    assert files[0].exists()
+
+
+def test_a_plan_that_does_not_stay_clear_is_none(monkeypatch, capsys, tmp_path):
+    good = planned("sphere")
+    wall = Obstacle(Box((0.01, 0.01, 0.01)), good.arm.fk(good.plan.joints[len(good.plan.joints) // 2]), name="nail")
+    asked = good.plan.asked._replace(obstacles=(wall,))
+    monkeypatch.setattr(plan_command, "plan_in", lambda scene: good._replace(plan=good.plan._replace(asked=asked)))
+    assert run_plan("sphere", [], None, tmp_path / "plan.json", timed=True) == NOT_FOUND
+    assert "sphere: plan_failed: the timed motion is not clear at" in capsys.readouterr().out
+    assert not (tmp_path / "plan.json").exists()
 
 
 @pytest.mark.parametrize("name", [*FOUND, "cage"])

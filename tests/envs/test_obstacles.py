@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
+import fcl
 import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.surroundings import intruders_of
@@ -39,10 +42,41 @@ def started(env, *intruders, **options):
 def brute_distance(env):
     """Smallest distance of all solid geoms of the robot to the obstacles that are there [m]."""
     sim = env.sim
-    solid = (sim.model.geom_contype != 0) & np.isin(sim.scene.owner, (ARM, FINGERS))
+    model = sim.model
+    solid = ((model.geom_contype != 0) | (model.geom_conaffinity != 0)) & np.isin(sim.scene.owner, (ARM, FINGERS))
     slots = np.flatnonzero(sim.obstacles.active)
     pairs = [(int(geom), int(sim.scene.obstacles[slot, 1])) for geom in np.flatnonzero(solid) for slot in slots]
-    return min(mujoco.mj_geomDistance(sim.model, sim.data, *pair, 5.0, None) for pair in pairs)
+    return min(fcl_distance(sim, *pair) for pair in pairs)
+
+
+def fcl_distance(sim, *geoms):
+    """Distance of two geoms by python-fcl [m]; meshes by their hulls, as MuJoCo takes them."""
+    bodies = []
+    for geom in geoms:
+        x, y, z = sim.model.geom_size[geom]
+        made = {
+            mujoco.mjtGeom.mjGEOM_MESH: lambda geom=geom: fcl_hull(sim, geom),
+            mujoco.mjtGeom.mjGEOM_BOX: lambda x=x, y=y, z=z: fcl.Box(2 * x, 2 * y, 2 * z),
+            mujoco.mjtGeom.mjGEOM_SPHERE: lambda x=x: fcl.Sphere(x),
+            mujoco.mjtGeom.mjGEOM_CAPSULE: lambda x=x, y=y: fcl.Capsule(x, 2 * y),
+        }[sim.model.geom_type[geom]]()
+        rotation = sim.data.geom_xmat[geom].reshape(3, 3)
+        bodies.append(fcl.CollisionObject(made, fcl.Transform(rotation, sim.data.geom_xpos[geom])))
+    return fcl.distance(*bodies, fcl.DistanceRequest(), fcl.DistanceResult())
+
+
+@cache
+def fcl_hull(sim, geom):
+    model = sim.model
+    mesh = model.geom_dataid[geom]
+    points = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(float)
+    hull = ConvexHull(points)
+    rows = np.searchsorted(hull.vertices, hull.simplices)
+    solid = fcl.BVHModel()
+    solid.beginModel(len(hull.vertices), len(rows))
+    solid.addSubModel(points[hull.vertices], rows)
+    solid.endModel()
+    return solid
 
 
 def core_points(shape):
@@ -108,8 +142,32 @@ def test_the_distance_told_is_the_smallest_of_all_pairs_so_far(env, shape):
     for _ in range(40):
         *_, info = env.step(rng.uniform(-0.5, 0.5, 8))
         smallest = min(smallest, brute_distance(env))
-        assert info["min_obstacle_distance"] <= smallest + 1e-4
-    assert info["min_obstacle_distance"] == pytest.approx(smallest, abs=1e-3)
+        assert info["min_obstacle_distance"] == pytest.approx(smallest, abs=2e-5)
+
+
+def test_distances_are_those_of_another_library_also_where_mujoco_says_zero(env):
+    rng, zeros = np.random.default_rng(0), 0
+    for seed in range(150):
+        turn = rng.normal(size=4)
+        shape = Box(tuple(rng.uniform(0.03, 0.1, 3)))
+        place = rng.uniform([-0.4, -0.4, 0.9], [0.2, 0.4, 1.5])
+        each = Intruder(shape, tuple(place), tuple(turn / np.linalg.norm(turn)))
+        *_, info = env.reset(seed=seed, options={"level": "L2", "obstacles": [each]})
+        expected = brute_distance(env)
+        if expected > 0.0:
+            assert info["min_obstacle_distance"] == pytest.approx(expected, abs=2e-5), seed
+        zeros += raw_zeros(env)
+    assert zeros > 0, "MuJoCo is mended: the nudges in nearness can go"
+
+
+def raw_zeros(env):
+    """How many pairs of robot and obstacle MuJoCo says touch that do not."""
+    sim, own = env.sim, int(env.sim.scene.obstacles[0, 1])
+    model = sim.model
+    solid = ((model.geom_contype != 0) | (model.geom_conaffinity != 0)) & np.isin(sim.scene.owner, (ARM, FINGERS))
+    pairs = [(int(geom), own) for geom in np.flatnonzero(solid)]
+    said = [mujoco.mj_geomDistance(sim.model, sim.data, *pair, 2.0, None) == 0.0 for pair in pairs]
+    return sum(zero and fcl_distance(sim, *pair) > 1e-3 for zero, pair in zip(said, pairs, strict=True))
 
 
 def test_what_is_not_there_is_zeros_and_what_is_there_is_told_in_full(env):

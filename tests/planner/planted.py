@@ -49,6 +49,7 @@ ARMS = ("clearance", "bounds_of_two_arms")
 WAY = ("clearance", "farther_than_its_bound or bound_of_one_joint")
 STEP = ("clearance", "tunnel or small_ball or one_joint_bends or too_close_may_part or short_motion")
 EDGE = ("clearance", "edge_past or edge_of_a_tool")
+ROOM = ("repet", "first_blocked")
 CLOSED = ("safety", "closed_form or along_a_surface or rises")
 GUARD = ("safety", "jumped_over or margin_goes_before or too_close_is_left")
 LIMITS = ("safety", "limits_are_never or pushed or beyond_a_limit")
@@ -88,7 +89,7 @@ BUGS = [
     Bug(
         "capsule end not looked at again",
         "proximity",
-        "t = clamped((s * da - pd) / dd, 0.0, 1.0) if dd > 0.0 else 0.0",
+        "t = clamped((s * da - pd) * (1.0 / max(dd, TINY)), 0.0, 1.0)",
         "t = 1.0 * t",
         SEARCH,
     ),
@@ -149,11 +150,11 @@ BUGS = [
     Bug(
         "lever of the nearer end",
         "clearance",
-        "(max(_lever(g, joint, a), _lever(g, joint, b)) + way)",
-        "(min(_lever(g, joint, a), _lever(g, joint, b)) + way)",
+        "square = max(_lever_square(g, joint, a), _lever_square(g, joint, b))",
+        "square = min(_lever_square(g, joint, a), _lever_square(g, joint, b))",
         WAY,
     ),
-    Bug("lever does not grow", "clearance", "_lever(g, joint, b)) + way)", "_lever(g, joint, b)))", WAY),
+    Bug("lever does not grow", "clearance", "(math.sqrt(square) + way)", "math.sqrt(square)", WAY),
     Bug("way of sliding joints dropped", "clearance", "way += abs(step[joint])\n", "way += 0.0\n", WAY),
     Bug("bend dropped", "clearance", "bend = 0.25 * turning * way", "bend = 0.0", STEP),
     Bug(
@@ -239,13 +240,26 @@ BUGS = [
     Bug(
         "guard does not look between the ends",
         "safety",
-        "if gentle and step_stays_clear(g, q, step[:n], dt):",
+        "if gentle and (whole or step_stays_clear(g, q, step[:n], dt)):",
         "if gentle:",
         GUARD,
     ),
     Bug(
-        "guard does not look at all", "safety", "if gentle and step_stays_clear(g, q, step[:n], dt):", "if True:", GUARD
+        "guard does not look at all",
+        "safety",
+        "if gentle and (whole or step_stays_clear(g, q, step[:n], dt)):",
+        "if True:",
+        GUARD,
     ),
+    Bug("guard takes every whole step for clear", "safety", "whole = k == 0 and", "whole = k == 0 or", GUARD),
+    Bug(
+        "guard takes shorter steps for the whole one",
+        "safety",
+        "whole = k == 0 and placed_step_stays_clear(g, step[:n], 0.0, dt)",
+        "whole = k > 0 or placed_step_stays_clear(g, step[:n], 0.0, dt)",
+        GUARD,
+    ),
+    Bug("all bounds are taken to hold", "barrier", "if all_hold(rows, count, x, n):", "if True:", CLOSED),
     Bug(
         "guard sends what it has refused",
         "safety",
@@ -269,6 +283,8 @@ BUGS = [
         ("safety", "absurd"),
     ),
     Bug("blocked is hidden", "safety", "return BLOCKED if missed else status", "return min(status, HELD)", MOVING),
+    Bug("room ahead is not used up", "escape", "        left -= way\n", "        left -= 0.0 * way\n", ROOM),
+    Bug("room ahead is used once too often", "escape", "if left <= way and not", "if left <= -way and not", ROOM),
     Bug("slide goes on too far", "edges", "s -= room / slope", "s -= 3.0 * room / slope", EDGE),
     Bug("screw goes on too far", "edges", "stretch = room / speed", "stretch = 3.0 * room / speed", EDGE),
     Bug(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -29,13 +30,14 @@ from onedemo.planner.body_models import body_from_urdf
 from onedemo.planner.certify import ANGLE_ERROR, POSITION_ERROR, certify
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, UnknownName
 from onedemo.planner.joint_leg import JointSearchSettings
-from onedemo.planner.planning import Plan, Planner, PlanSettings, Problem, plan, plan_batch
+from onedemo.planner.planning import Planner, plan, plan_batch
+from onedemo.planner.plans import Plan, PlanSettings, Problem
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.repet import MAX_OBSTACLES, RepetSettings
 from onedemo.planner.safety import SafetySettings
 from onedemo.planner.scene_work import SceneWork
 from onedemo.planner.shapes import Box, Capsule, Obstacle, Sphere
-from onedemo.planner.tsia import screw_path
+from onedemo.planner.tsia import guide_index, screw_path
 
 WAYS = ("direct", "escape", "joint search")
 
@@ -82,7 +84,8 @@ def test_every_cage_is_an_honest_failure():
     for seed in range(12):
         failed = solve(problem("cage", seed))
         assert not failed.success
-        assert failed.reason == "no escape found"
+        assert failed.reason in ("no escape found", "node limit reached")
+        assert "trees" in failed.detail if failed.reason == "no escape found" else "4000 nodes" in failed.detail
         assert failed.tree is None or len(failed.tree.poses) <= SETTINGS.repet.nodes
         np.testing.assert_array_equal(failed.joints, [problem("cage", seed).start])
 
@@ -309,18 +312,109 @@ def test_a_goal_out_of_reach_is_an_honest_failure(place):
         np.testing.assert_array_equal(failed.joints, home[None])
 
 
-def test_a_start_or_goal_that_cannot_be_is_named():
+def test_a_start_or_goal_that_cannot_be_is_named_with_part_and_obstacle():
     arm, body, home = panda()
     planner, (_, goal) = Planner(arm, body), free_leg()
     beyond = home.copy()
     beyond[3] = arm.upper[3] + 0.01
-    assert planner.plan(demonstrated(), beyond, goal).reason == "start beyond a joint limit"
-    on_hand = [Obstacle(Sphere(0.05), at(arm.fk(home).position))]
-    assert planner.plan(demonstrated(), home, goal, on_hand).reason == "start in collision"
-    elbow = [Obstacle(Sphere(0.05), at([-0.56, 0.0, 1.5]))]
-    assert planner.plan(demonstrated(), home, goal, elbow).reason == "start in collision"
-    on_goal = [Obstacle(Sphere(0.05), at(goal.position))]
-    assert planner.plan(demonstrated(), home, goal, on_goal).reason == "goal in collision"
+    failed = planner.plan(demonstrated(), beyond, goal)
+    assert failed.why == f"start beyond a joint limit: {arm.joint_names[3]} by 0.010 rad"
+    far = Obstacle(Sphere(0.05), at([0.0, 0.0, 9.0]), name="far")
+    tcp = arm.fk(home).position
+    on_hand = [far, Obstacle(Sphere(0.05), at(tcp), name="ball")]
+    failed = planner.plan(demonstrated(), home, goal, on_hand)
+    assert failed.reason == "start in collision" and failed.detail in ("fingers touches ball", "hand touches ball")
+    elbow = [Obstacle(Sphere(0.05), at([-0.56, 0.0, 1.5])), far]
+    failed = planner.plan(demonstrated(), home, goal, elbow)
+    assert failed.reason == "start in collision" and re.fullmatch("link[34] touches obstacle 0", failed.detail)
+    on_goal = [far, Obstacle(Sphere(0.05), at(goal.position), name="cup")]
+    failed = planner.plan(demonstrated(), home, goal, on_goal)
+    assert failed.reason == "goal in collision" and failed.detail in ("fingers touches cup", "hand touches cup")
+    # what is held is named as what it is, and what is near but apart with the distance
+    holding = Planner(arm, body.holding("held", Box((0.05, 0.05, 0.05)), at([0.0, 0.0, 0.04]), arm))
+    for start, end, place in ((home, goal, arm.fk(home)), (home, goal, goal)):
+        below = [Obstacle(Box((0.2, 0.2, 0.02)), at(place.position - [0.0, 0.0, 0.085]), name="shelf")]
+        failed = holding.plan(demonstrated(), start, end, below)
+        which = "goal" if place is goal else "start"
+        assert re.fullmatch(
+            rf"{which} in collision: held (touches shelf|is \d\.\d mm from shelf, which must be 10\.0)", failed.why
+        ), failed.why
+
+
+def test_what_is_too_close_for_a_detour_is_named():
+    arm, body, home = panda()
+    goal = at([0.0, 0.4, 1.0], free_leg()[1].quaternion)
+    wall = Obstacle(Box((2.0, 0.02, 3.0)), at([0.65, 0.2, 1.0]), name="wall")
+    shelf = Obstacle(Box((0.2, 0.2, 0.02)), at(goal.position - [0.0, 0.0, 0.3]), name="shelf")
+    gap = SceneWork.of(arm, body, [shelf], SETTINGS).tool_room(goal) + SETTINGS.safety.distance
+    near = Obstacle(shelf.shape, at([0.0, 0.0, gap - 0.015]) @ shelf.pose, name="shelf")
+    planner = Planner(arm, body, PlanSettings(search=None))
+    failed = planner.plan(demonstrated(), home, goal, [wall, near])
+    assert failed.why == "no room for a detour at the goal: fingers is 15.0 mm from shelf, which must be 20.0"
+    assert planner.plan(demonstrated(), home, goal, [wall, shelf]).reason in ("no escape found", "node limit reached")
+
+
+def test_a_tree_that_is_stopped_says_so():
+    scene = problem("cage", 1)
+    few = replace(SETTINGS, repet=replace(SETTINGS.repet, nodes=200), search=None)
+    failed = solve(scene, few)
+    assert failed.why == "node limit reached: a tree had 200 nodes, see repet.nodes"
+    assert failed.tree is not None and len(failed.tree.poses) == 200
+    many = replace(SETTINGS, repet=replace(SETTINGS.repet, nodes=200_000, levels=5), search=None)
+    failed = solve(scene, many)
+    assert re.fullmatch(r"no escape found: \d+ nodes in the last of 5 trees", failed.why)
+
+
+def test_no_tree_of_another_leg_is_shown():
+    arm, body, home = panda()
+    _, goal = free_leg()
+    planner = Planner(arm, body)
+    scene = problem("cage", 0)
+    assert planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles).tree is not None
+    assert planner.plan(demonstrated(), home, goal).tree is None
+
+
+# Good plans and fallbacks
+
+
+def suffix_share(plan: Plan) -> float:
+    """Screw length of the imitated path at the end of what is followed, over that behind the guiding pose."""
+    imitated, path = plan.imitated_poses, plan.path_poses
+    count = 0
+    while count < min(len(imitated), len(path)) and np.array_equal(imitated[-1 - count], path[-1 - count]):
+        count += 1
+    lengths = plan.imitated.lengths()
+    guide = guide_index(plan.imitated, SETTINGS.motion.guide)
+    return (lengths[-1] - lengths[len(lengths) - count]) / (lengths[-1] - lengths[guide])
+
+
+def test_fallbacks_are_kept_only_where_nothing_better_is_found():
+    first = replace(SETTINGS, effort=0)
+    better = tried = 0
+    for kind in ("trap", "shelf", "held"):
+        for seed in range(15):
+            scene = problem(kind, seed)
+            one, two = solve(scene, first), solve(scene)
+            if not one.success:
+                continue
+            assert two.success and judged(scene, two).ok
+            assert two.kept >= suffix_share(two) - 1e-9
+            good = one.kept >= SETTINGS.keep and one.end_margin >= SETTINGS.end_margin
+            if good:
+                assert same_plan(one, two), "what is good at the first try is taken"
+                continue
+            tried += 1
+            assert (round(two.kept, 1), two.end_margin) >= (round(one.kept, 1), one.end_margin)
+            better += two.kept > one.kept + 0.05 or two.end_margin > one.end_margin + 0.05
+            assert two.tries <= one.tries + SETTINGS.effort
+    assert tried >= 10 and better >= 0.5 * tried
+
+
+def test_a_plan_that_ends_at_a_joint_limit_is_a_fallback():
+    scene = problem("convex", 0)
+    one, two = solve(scene, replace(SETTINGS, effort=0)), solve(scene)
+    assert one.success and one.end_margin < SETTINGS.end_margin < two.end_margin
+    assert judged(scene, two).ok
 
 
 def test_what_stands_in_the_base_is_a_collision_or_nobodys():

@@ -10,9 +10,7 @@ import pytest
 from onedemo.envs.bodies import robot_body
 from onedemo.envs.scene import compiled_scene
 from onedemo.planner.clearance import room_at
-from onedemo.planner.errors import BadOption
-from onedemo.planner.pose import Pose
-from onedemo.planner.reactive import (
+from onedemo.planner.command import (
     BLOCKED,
     DONE,
     ESCAPING,
@@ -20,10 +18,11 @@ from onedemo.planner.reactive import (
     FOLLOWING,
     STATES,
     WAITING,
-    ReactivePlanner,
     ReactiveSettings,
-    warm_up,
 )
+from onedemo.planner.errors import BadOption
+from onedemo.planner.pose import Pose
+from onedemo.planner.reactive import ReactivePlanner, warm_up
 from onedemo.planner.scene_work import SceneWork
 from onedemo.planner.shapes import Box, Obstacle, Sphere
 from onedemo.planner.tsia import screw_path
