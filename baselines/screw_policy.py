@@ -18,6 +18,7 @@ from ..planner.safety import SafetySettings
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
 from .pour_program import PourProgram
+from .shelve_program import ShelveProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
 
@@ -67,13 +68,14 @@ class ScrewSettings:
         return ReactiveSettings(plan=plan, patience=self.motion.pursuit.patience)
 
 
-PROGRAMS = {"stack": StackProgram, "pour": PourProgram}
+Program = StackProgram | PourProgram | ShelveProgram
+PROGRAMS = {"stack": StackProgram, "pour": PourProgram, "shelve": ShelveProgram}
 
 
 class Episode:
     """What the policy remembers of an episode: the hand, the running program and how it ended."""
 
-    def __init__(self, hand: Hand, program: StackProgram | PourProgram):
+    def __init__(self, hand: Hand, program: Program):
         self.hand, self.program = hand, program
         self.actions: Iterator[np.ndarray] | None = program.actions()
         self.ended = PolicyReport()

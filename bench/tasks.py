@@ -38,4 +38,5 @@ class TaskFacts:
 TASKS = {
     "stack": TaskFacts("onedemo/Stack-v0", Error("position_error", "largest position error", "mm", 1e3)),
     "pour": TaskFacts("onedemo/Pour-v0", Error("fraction_outside", "largest share of beads outside", "%", 1e2)),
+    "shelve": TaskFacts("onedemo/Shelve-v0", Error("position_error", "largest position error", "mm", 1e3)),
 }

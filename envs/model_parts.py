@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
-from .things import Beads, Color, Furniture, Glass, Solid, half_sizes
+from .things import Beads, Book, Color, Furniture, Glass, Solid, half_sizes
 
 FRICTION = "1.0 0.005 0.0001"
 """Sliding, torsional, rolling."""
@@ -18,6 +18,11 @@ STAVES = 12
 BEAD_SOLREF = "0.005 1"
 """Time constant [s] and damping of a bead's contacts: with MuJoCo's 20 ms, falling beads sink through a 3 mm wall."""
 OBSTACLE_COLOR: Color = (0.86, 0.24, 0.16, 1.0)
+PAPER: Color = (0.95, 0.92, 0.84, 1.0)
+COVER = 0.0025
+"""Thickness of a book's cover [m], and how far it stands out over the paper."""
+TITLE = (0.18, 0.62)
+"""Where a book's title is on its spine: from and to, in parts of its height."""
 PARKED = "0 0 -3"
 """Where an obstacle is that is not there."""
 
@@ -31,8 +36,13 @@ def _geom(body: Element, kind: str, size: Iterable[float], color: Color, **more:
     shared = {"type": kind, "size": _text(size)}
     place = {key: more.pop(key) for key in ("pos", "quat") if key in more}
     SubElement(body, "geom", {**shared, **place, "group": "0", "rgba": "0 0 0 0", "friction": FRICTION, **more})
-    twin = {"group": "1", "rgba": _text(color), "contype": "0", "conaffinity": "0", "mass": "0"}
-    SubElement(body, "geom", {**shared, **place, **twin})
+    _seen(body, kind, size, color, **place)
+
+
+def _seen(body: Element, kind: str, size: Iterable[float], color: Color, **place: str) -> None:
+    """A geom that is seen and not felt."""
+    unfelt = {"group": "1", "contype": "0", "conaffinity": "0", "mass": "0"}
+    SubElement(body, "geom", {"type": kind, "size": _text(size), "rgba": _text(color), **place, **unfelt})
 
 
 def _free(name: str) -> Element:
@@ -66,6 +76,23 @@ def glass_body(glass: Glass) -> Element:
     bottom = _text((0.0, 0.0, 0.5 * (glass.wall - glass.height)))
     disc = (glass.radius, 0.5 * glass.wall)
     _geom(body, "cylinder", disc, glass.color, mass=f"{0.2 * glass.mass}", condim="4", pos=bottom)
+    return body
+
+
+def book_body(book: Book) -> Element:
+    """A box that looks like two boards and a spine around paper, with a band for its title."""
+    body = _free(book.name)
+    x, y, z = (0.5 * size for size in book.size)
+    solid = {"type": "box", "size": _text((x, y, z)), "group": "0", "rgba": "0 0 0 0", "friction": FRICTION}
+    SubElement(body, "geom", {**solid, "density": f"{book.density}", "condim": "4"})
+    for side in (-1.0, 1.0):
+        board = _text((0.0, side * (y - 0.5 * COVER), 0.0))
+        _seen(body, "box", (x, 0.5 * COVER, z), book.color, pos=board)
+    _seen(body, "box", (0.5 * COVER, y, z), book.color, pos=_text((0.5 * COVER - x, 0.0, 0.0)))
+    _seen(body, "box", (x - COVER, y - COVER, z - COVER), PAPER)
+    low, high = (z * (2.0 * part - 1.0) for part in TITLE)
+    title = (1e-4, 0.72 * y, 0.5 * (high - low))
+    _seen(body, "box", title, PAPER, pos=_text((-x, 0.0, 0.5 * (low + high))))
     return body
 
 

@@ -52,6 +52,8 @@ class Leg:
         shape: of what is held.
         tcp_from_object: how it is held.
         motion: the task's motion index while the hand is on it.
+        aside: how far [m] to the side of the hand's straight way an obstacle's center may be.
+        above: how far [m] above or below it: more for what sweeps more.
     """
 
     start: Pose
@@ -60,6 +62,8 @@ class Leg:
     shape: Shape
     tcp_from_object: Pose
     motion: int
+    aside: float = 0.02
+    above: float = 0.03
 
     @cached_property
     def sweep(self) -> np.ndarray:
@@ -210,7 +214,7 @@ def _center(rng: np.random.Generator, leg: Leg, low: float, high: float) -> np.n
     way = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
     side = np.array([-way[1], way[0], 0.0])
     middle = a + rng.uniform(low, high) * (b - a)
-    return middle + rng.uniform(-0.02, 0.02) * side + np.array([0.0, 0.0, rng.uniform(-0.03, 0.03)])
+    return middle + rng.uniform(-leg.aside, leg.aside) * side + np.array([0, 0, rng.uniform(-leg.above, leg.above)])
 
 
 def _still(rng: np.random.Generator, stage: Stage, leg: int, size: float | None) -> Intruder:

@@ -87,6 +87,12 @@ class Simulation:
         self._near.reset()
         mujoco.mj_forward(self.model, self.data)
 
+    def put(self, index: int, pose: np.ndarray) -> None:
+        """Lay an object at a pose (7,), at rest: for what a human does, never for what the robot touches."""
+        address, dof = self._object_index[index]
+        self.data.qpos[address : address + 7] = pose
+        self.data.qvel[dof : dof + 6] = 0.0
+
     def advance_obstacles(self, seconds: float, motion: float) -> None:
         """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""
         if self.obstacles.intruders:

@@ -19,9 +19,9 @@ from robosuite.models.tasks import ManipulationTask
 from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
 from robosuite.utils.mjcf_utils import CustomMaterial
 
-from .model_parts import bead_bodies, furniture_body, glass_body, obstacle_bodies, solid_body
+from .model_parts import bead_bodies, book_body, furniture_body, glass_body, obstacle_bodies, solid_body
 from .servos import leave_out_unused, use_velocity_servos
-from .things import TABLE_HALF_SIZE, TABLE_HEIGHT, Glass, Solid, Things, half_sizes
+from .things import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, Glass, Solid, Things, half_sizes
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
 FRICTION = (1.0, 0.005, 0.0001)
@@ -68,6 +68,7 @@ def _other_bodies(things: Things) -> list[Element]:
     """Everything that robosuite's own objects cannot be."""
     free = [glass_body(each) for each in things.objects if isinstance(each, Glass)]
     free += [solid_body(each) for each in things.objects if isinstance(each, Solid) and not each.texture]
+    free += [book_body(each) for each in things.objects if isinstance(each, Book)]
     free += [furniture_body(each) for each in things.furniture]
     beads = bead_bodies(things.beads) if things.beads else []
     return [*free, *beads, *obstacle_bodies(things.obstacles)]

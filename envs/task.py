@@ -10,7 +10,7 @@ from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.pose import Pose
 from ..planner.shapes import Obstacle, Shape
-from .things import Furniture, Glass, Solid, extents
+from .things import Book, Furniture, Glass, Solid, extents
 
 FAILURES = (
     "ik_or_limit",
@@ -41,7 +41,7 @@ class TaskObject:
     yaw_symmetry: float
 
     @staticmethod
-    def of(thing: Solid | Glass) -> TaskObject:
+    def of(thing: Solid | Glass | Book) -> TaskObject:
         """What a policy may know of a thing."""
         return TaskObject(thing.name, thing.shape, thing.yaw_symmetry)
 

@@ -70,6 +70,31 @@ class Glass:
 
 
 @dataclass(frozen=True)
+class Book:
+    """A free, closed book: to the physics one box, to the eye a cover around paper.
+
+    Its frame is in its middle: x from the spine to the edge that opens, y across its thickness, z along the spine.
+
+    Attributes:
+        name: unique.
+        size: depth, thickness, height [m].
+        color: of the cover.
+        density: [kg/m3].
+    """
+
+    name: str
+    size: tuple[float, float, float]
+    color: Color
+    density: float = 243.5
+    yaw_symmetry = 2.0 * np.pi
+
+    @property
+    def shape(self) -> Box:
+        """It."""
+        return Box(self.size)
+
+
+@dataclass(frozen=True)
 class Beads:
     """Small balls that stand for a liquid; each slides without turning, which is what makes them cheap.
 
@@ -130,7 +155,7 @@ class Things:
         obstacles: how many bodies of any shape may be in the way at once.
     """
 
-    objects: tuple[Solid | Glass, ...] = ()
+    objects: tuple[Solid | Glass | Book, ...] = ()
     furniture: tuple[Furniture, ...] = ()
     beads: Beads | None = None
     obstacles: int = 0

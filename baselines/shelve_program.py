@@ -1,0 +1,145 @@
+"""Shelving from the demonstration of ONE book in the lower shelf: fetch, lift, carry, insert, again and again.
+
+Only the goals are new: a grasp is where the demonstrated hand was relative to the book it took, the end of an
+insertion is the slot, seen from how the hand holds the book, and the end of a carry is where that insertion begins.
+Lift and retreat are imitated from where they start: both leave something that they must not drag along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..envs.task import TaskDescription
+from ..planner.demo import Demonstration
+from ..planner.errors import PlanFailed
+from ..planner.motions import Motion, plan_motion
+from ..planner.pose import Pose, PosePath
+from ..planner.segment import resampled
+from ..planner.tsia import imitated_path
+from .hand import CLOSE, OPEN, Hand
+from .policy import LabeledPath
+
+if TYPE_CHECKING:
+    from .screw_policy import ScrewSettings
+
+CUPBOARD, STAND = "cupboard", "stand"
+LOST = 0.03
+"""Distance [m] of a book from where it should be in the hand beyond which it was dropped."""
+PATIENCE = 5.0
+"""Seconds that a book is waited for."""
+
+
+class ShelveProgram:
+    """The program of one episode; iterate over `actions()`."""
+
+    SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")
+    """What a demonstration of this task must have."""
+
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
+        self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
+        self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
+        self._release = _gripper_after(shown, "insert")
+        self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
+
+    def actions(self) -> Iterator[np.ndarray]:
+        """Fetch and shelve each book in order, then withdraw."""
+        for k in range(len(self.hand.observation["goal_pose"])):
+            yield from self._awaited(k)
+            yield from self._fetch(k)
+            yield from self._lift(k)
+            yield from self._shelve(k)
+            yield from self._retreat()
+
+    def _awaited(self, k: int) -> Iterator[np.ndarray]:
+        """Open the hand, and rise out of the way until book k lies on the stand: nobody reaches under an arm."""
+        yield from self.hand.grip(OPEN, self.settings.open)
+        out_of_the_way = () if self._on_stand(k) else self.hand.follow(self._from_here("lift"), loosely=True)
+        for action in out_of_the_way:
+            yield action
+            if self._on_stand(k):
+                return
+        left = round(PATIENCE / self.task.control_dt)
+        while not self._on_stand(k):
+            if left == 0:
+                raise PlanFailed("timeout", f"{self.task.objects[k].name} was not handed over")
+            left -= 1
+            yield self.hand.still()
+
+    def _on_stand(self, k: int) -> bool:
+        names = [each.name for each in self.task.furniture]
+        return self.hand.object_pose(k).position[2] > self.hand.observation["furniture_pose"][names.index(STAND), 2]
+
+    def _fetch(self, k: int) -> Iterator[np.ndarray]:
+        name, reach = self.task.objects[k].name, self._parts["reach"]
+        grasp = self.shown.segment("reach").reference_pose.inverse() @ reach[-1]
+        reach = imitated_path(reach, self.hand.object_pose(k) @ grasp)
+        self.hand.allow(())
+        yield from self._imitated("approach", reach[0], name)
+        self.hand.allow((*_around((name,)), ("fingers", STAND)))
+        yield from self.hand.follow(reach)
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(CLOSE, self.settings.close)
+
+    def _lift(self, k: int) -> Iterator[np.ndarray]:
+        target = self.task.objects[k]
+        grasped = self._held(k)
+        self.hand.hold(k, target.shape, grasped)
+        self.hand.allow((("held", STAND), ("fingers", STAND)))
+        yield from self.hand.follow(self._from_here("lift"), loosely=True)
+        if self._held(k).gap(grasped)[0] > LOST:
+            raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
+
+    def _shelve(self, k: int) -> Iterator[np.ndarray]:
+        name = self.task.objects[k].name
+        # the book slips a little while it is lifted: the goal is computed from how it is held now
+        insertion = self._insertion(k)
+        self.hand.allow(())
+        yield from self._imitated("carry", insertion[0], name)
+        neighbors = tuple(each.name for each in self.task.objects[:k])
+        self.hand.allow((("held", CUPBOARD), *_around(neighbors)))
+        yield from self.hand.follow(self._insertion(k))
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(self._release, self.settings.open)
+        self.hand.release()
+        self.hand.allow(_around((*neighbors, name)))
+
+    def _retreat(self) -> Iterator[np.ndarray]:
+        yield from self.hand.follow(self._from_here("retreat"), loosely=True)
+
+    def _insertion(self, k: int) -> PosePath:
+        """The demonstrated insertion, to where the hand lets go so that the book is in its slot."""
+        goal = self.hand.goal_pose(k) @ self._held(k).inverse()
+        above = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height])
+        return imitated_path(self._parts["insert"], above @ goal)
+
+    def _from_here(self, name: str) -> PosePath:
+        path = self._parts[name]
+        return path.moved(self.hand.arm.fk(self.hand.q) @ path[0].inverse())
+
+    def _imitated(self, name: str, goal: Pose, what: str) -> Iterator[np.ndarray]:
+        motion = self._planned(name, goal)
+        if not motion.arrives:
+            raise PlanFailed(motion.reason, f"{name} of {what} cannot be done along the demonstration")
+        self.paths.append(LabeledPath("final", f"{name} {what}", motion.final_path))
+        yield from self.hand.follow(motion.tail)
+
+    def _planned(self, name: str, goal: Pose) -> Motion:
+        return plan_motion(self.hand.arm, self.hand.q, self._parts[name], goal, self.settings.motion)
+
+    def _held(self, k: int) -> Pose:
+        """`tcp_from_object` as observed."""
+        return self.hand.measured_tcp.inverse() @ self.hand.object_pose(k)
+
+
+def _around(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Contacts of hand and books while a book is taken or let go: the hand's capsules contain more than the hand."""
+    return tuple((part, name) for part in ("fingers", "hand") for name in names)
+
+
+def _gripper_after(shown: Demonstration, name: str) -> float:
+    """What the demonstrated gripper did at the end of a motion."""
+    assert shown.gripper is not None
+    return float(shown.gripper[shown.segment(name).stop + 1])

@@ -1,0 +1,78 @@
+"""Places that a caller gives to shelving's `reset(options=...)`, checked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..planner.errors import BadOption
+from ..planner.pose import Pose
+from .options import checked_array, checked_poses
+from .shelf_layouts import CUPBOARD, CUPBOARD_YAW, STAND, STAND_YAW, ShelfLayout
+from .shelf_parts import BOOK_SIZE, CLUTTER, PITCH, SHELVES, WIDTH
+from .things import TABLE_HEIGHT
+
+OPTIONS = ("level", "obstacles", "stand_pose", "cupboard_pose", "slots", "clutter", "joint_positions")
+STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN = 0.12, 0.15, 0.10, np.deg2rad(45.0)
+"""How far a given stand may be from the nominal one [m, rad]."""
+CUPBOARD_WAY, CUPBOARD_TURN = 0.05, np.deg2rad(20.0)
+"""How far a given cupboard may be from the nominal one [m, rad]: it stands on the table, within reach."""
+BESIDE = 0.03
+"""Least room [m] for a finger beside a book that is let go."""
+
+
+def given_layout(drawn: ShelfLayout, options: dict[str, Any]) -> ShelfLayout:
+    """The layout drawn, changed by what is given.
+
+    Raises:
+        BadOption: a stand or a cupboard that is out of reach, off the table or tilted; slots or clutter that are
+            inside each other or the cupboard.
+    """
+    changes: dict[str, Any] = {}
+    if "stand_pose" in options:
+        nominal, way = (STAND, STAND_YAW), (STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN)
+        changes["stand"] = _standing("stand_pose", options["stand_pose"], nominal, way)
+    if "cupboard_pose" in options:
+        nominal, way = ((*CUPBOARD, TABLE_HEIGHT), CUPBOARD_YAW), (CUPBOARD_WAY, 0.001, 0.001, CUPBOARD_TURN)
+        changes["cupboard"] = _standing("cupboard_pose", options["cupboard_pose"], nominal, way)
+    if "slots" in options:
+        changes["slots"] = float(checked_array("slots", options["slots"], ()))
+    if "clutter" in options:
+        changes["clutter"] = checked_array("clutter", options["clutter"], (len(CLUTTER), 2))
+    layout = replace(drawn, **changes)
+    _check_room(layout)
+    return layout
+
+
+def _standing(option: str, value: Any, nominal: tuple[Any, float], way: tuple[float, float, float, float]) -> Pose:
+    """An upright pose near the nominal place (x, y, z) and yaw, by at most `way` to the side, down, up and in yaw."""
+    pose = Pose.from_vector(checked_poses(option, [value], 1)[0])
+    (x, y, z), yaw = nominal
+    aside, lower, higher, turn = way
+    off = pose.position - (x, y, z)
+    if pose.tilt > 0.01:
+        raise BadOption(option, "is tilted; only a yaw is possible")
+    if np.abs(off[:2]).max() > aside or not -lower <= off[2] <= higher:
+        places = f"x {x:g}, y {y:g} by {aside:g} m, z {z - lower:.4g} to {z + higher:.4g}"
+        raise BadOption(option, f"{np.round(pose.position, 3).tolist()} is out of reach or not a place; {places}")
+    if abs((pose.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi) > turn:
+        degrees = f"{np.degrees(yaw):.0f} by {np.degrees(turn):.0f} degrees"
+        raise BadOption(option, f"yaw of {np.degrees(pose.yaw):.0f} degrees cannot be reached; allowed: {degrees}")
+    return pose
+
+
+def _check_room(layout: ShelfLayout) -> None:
+    """Clutter and slots are in the cupboard and beside each other."""
+    if (layout.clutter < 0.0).any():
+        raise BadOption("clutter", f"gap {layout.clutter.min():.4g} m is negative: inside the wall or before the front")
+    reach = 0.5 * (PITCH * (len(layout.books) - 1) + BOOK_SIZE[1])
+    for shelf in SHELVES:
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            rows = [k for k, each in enumerate(CLUTTER) if each[:2] == (shelf, side)]
+            taken = sum(layout.clutter[k, 0] + CLUTTER[k][2][1] for k in rows)
+            room = 0.5 * WIDTH - taken - sign * layout.slots - reach
+            if room < BESIDE:
+                reason = f"leave {room:.3f} m beside the slots of the {shelf} shelf; {BESIDE} m are needed"
+                raise BadOption("slots", f"with the clutter on the {side} {reason}")

@@ -1,0 +1,249 @@
+"""Shelving books in a cluttered cupboard."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..planner.errors import BadOption, UnknownName
+from ..planner.pose import Pose
+from ..planner.shapes import Box, Obstacle, pack
+from .base import SLOTS, Observation, OneDemoEnv, checked_choice
+from .bodies import robot_body
+from .options import checked_joints
+from .placement import Leg, Order
+from .render import Ghost, View
+from .rooms import arm_room
+from .shelf_layouts import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
+from .shelf_options import OPTIONS, given_layout
+from .shelf_parts import BOOK_SIZE, SHELVES, books, cupboard, stand
+from .shelve_rules import ShelveProgress
+from .sim import Start
+from .spaces import observation_space, pose_box
+from .state import State
+from .task import TaskDescription, TaskFurniture, TaskObject
+from .things import TABLE_HEIGHT, Things
+
+VIEW = View(look_at=(0.0, -0.04, 1.13), distance=1.5, azimuth=38.0, elevation=-20.0)
+READY = {"Panda": (-0.435, 0.580, -0.670, -1.869, 1.843, 1.350, 0.048)}
+"""Start joints [rad]: the hand level before the stand, fingers above each other; other robots start at home."""
+LIFT, WAY_IN = 0.15, 0.22
+"""Heights above the stand and way before the slot at the ends of a carry [m]."""
+GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
+"""Hand (tcp) in the frame of a book that it holds by the spine, 25 mm deep, fingers on its covers."""
+SPREAD = 0.15
+"""Of obstacles about the hand's way [m]: a book and the hand behind it sweep far more than the way itself, which is
+so short that what lies right on it would be in the way of the hand before the slot, too."""
+CLEAR = 0.10
+"""The robot is at least this far from the stand while a book is put there [m]."""
+PAPER_SIZES = (0.06, 0.09)
+"""Of the obstacles that appear while the second and the third book are placed [m]."""
+
+
+class ShelveEnv(OneDemoEnv):
+    """Shelve three books in the upper shelf of a cluttered cupboard, with one arm.
+
+    ## Description
+    A cupboard with two shelves stands on a table, turned so that books go in along a yaw of about 75 degrees; other
+    books stand in it. Three books (160 x 220 x 35 mm, 0.3 kg) are handed over one at a time on a stand at about
+    shelf height, lying, spine over its edge. They must be put upright, spine to the front, into three slots 70 mm
+    apart. They are held by friction between the fingers only.
+
+    Handing over is the human's part, and the environment plays it: books that are not handed over yet wait in a
+    pile on the table, and when book k is in its slot, let go, and the whole robot is 10 cm away from the stand, the
+    next book is taken from the pile and laid onto the stand at once. The robot never touches a book that is moved
+    so. Everything else is physics.
+
+    Success is judged from the simulator: every book within 10 mm and 5 degrees of its slot, touched by no finger, at
+    rest, the hand withdrawn by 15 cm, no clutter book moved by more than 5 cm or turned by more than 15 degrees, for
+    half a second.
+
+    ## Action Space
+    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+
+    | control mode | entry | meaning |
+    |---|---|---|
+    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
+    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
+    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
+    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+
+    ## Observation Space
+    A `Dict` of float64 boxes; the first axis counts arms or books. Poses are `x y z [m]`, then quaternion wxyz.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | `joint_positions` | (1, 7) | [rad] |
+    | `joint_velocities` | (1, 7) | [rad/s] |
+    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `gripper_opening` | (1,) | gap between the finger pads [m] |
+    | `object_pose` | (n + 5, 7) | the books, then the clutter; a book's x points away from its spine, z along it |
+    | `goal_pose` | (n, 7) | where each book must end; constant during an episode |
+    | `furniture_pose` | (3, 7) | cupboard, stand and the stand's foot; constant during an episode |
+    | `motion_index` | (1,) | 2k while book k is to be fetched, 2k + 1 while it is held, 2n when all are shelved |
+    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
+    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
+    | `obstacle_pose` | (3, 7) | the obstacles |
+    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+
+    ## Rewards
+    `reward="dense"`: in [0, 1], the share of the task that is done, with reaching, grasping and carrying of the
+    current book in between. `reward="sparse"`: 1 with success, else 0.
+
+    ## Starting State
+    By `level`: L0 the nominal places; L1 the stand moved by up to 4 cm, 5 cm lower to 2.5 cm higher, turned by up to
+    10 degrees, the cupboard by up to 1 cm and 5 degrees, the slots by up to 15 mm along the shelf, books by up to
+    3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 15
+    degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. These ranges are what the Panda reaches.
+
+    L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way from stand to cupboard,
+    L4 one that swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the
+    forearm passes. R, S and T start as L1 does. Obstacles are solid; they overlap what hand and book sweep on the
+    straight way and leave room at the start, at every grasp and at every slot, whatever method is used.
+
+    ## Episode End
+    `terminated` with a settled success, or when a book has fallen off the table. `truncated` after 90 s (Gymnasium's
+    `TimeLimit`).
+
+    ## Info
+    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
+    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
+    what it holds), `layouts_refused` (starts that had no room for the obstacles), `books_placed`,
+    `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
+
+    ## Arguments
+    `robot="Panda"`, `n_books=3` (1 to 3), `shelf="upper" | "lower"` (the demonstration was given in the lower one),
+    `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
+    "forearm" | "paper"` (two of different size appear while the last two books are carried),
+    `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`, `control_frequency=50`,
+    `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of
+    `Intruder`), `stand_pose` (7,), `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `clutter` (5, 2: gaps
+    [m] from neighbor or wall, and from the front) and `joint_positions` (7,).
+
+    ## Version History
+    * v0: first version.
+    """
+
+    def __init__(
+        self,
+        robot: str = "Panda",
+        n_books: int = 3,
+        shelf: str = "upper",
+        level: str = "L1",
+        obstacles: str | None = None,
+        control_mode: str = "joint_velocity",
+        reward: str = "sparse",
+        control_frequency: int = 50,
+        render_mode: str | None = None,
+    ):
+        if isinstance(n_books, bool) or not isinstance(n_books, int) or not 1 <= n_books <= MOST_BOOKS:
+            raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
+        self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
+        objects, furniture = books(n_books), (cupboard(), *stand())
+        super().__init__(
+            robot=robot,
+            things=Things(objects, furniture),
+            level=level,
+            obstacles=obstacles,
+            control_mode=control_mode,
+            reward=reward,
+            render_mode=render_mode,
+            control_frequency=control_frequency,
+            view=VIEW,
+        )
+        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
+        counts = (len(objects), n_books, 2 * n_books, SLOTS)
+        self.observation_space = observation_space(self.arms, widths, *counts, furniture_pose=pose_box(len(furniture)))
+        self._task = TaskDescription(
+            name="shelve",
+            robot=robot,
+            arms=self.arms,
+            control_dt=self.control_dt,
+            objects=tuple(TaskObject.of(book) for book in objects),
+            bodies=tuple(robot_body(robot, k) for k in range(len(self.arms))),
+            table_height=TABLE_HEIGHT,
+            fixtures=self.sim.scene.fixtures,
+            gripper_width=widths,
+            furniture=tuple(TaskFurniture.of(each) for each in furniture),
+            obstacles=SLOTS,
+        )
+        home = self.sim.scene.home
+        self._ready = np.array([READY[robot]]) if robot in READY else home
+        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], n_books, home.shape)
+        self._take_layout(self._drawn)
+
+    @property
+    def task(self) -> TaskDescription:
+        """What every policy may know beforehand."""
+        return self._task
+
+    def _take_layout(self, drawn: ShelfLayout) -> None:
+        self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
+        self._furniture = drawn.furniture()
+        self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
+
+    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+        for key in options:
+            if key not in OPTIONS:
+                raise UnknownName("reset option", key, OPTIONS)
+        drawn = shelf_layout(self.np_random, RANGES[layout], self.n_books, self._ready.shape)
+        drawn = given_layout(drawn, options)
+        joints = np.clip(self._ready + drawn.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
+        if "joint_positions" in options:
+            joints = checked_joints(options["joint_positions"], self.arms)
+        self._take_layout(drawn)
+        return Start(joints, drawn.objects(), self._furniture)
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Act for one control step; afterwards the next book is handed over, if it is time."""
+        reached = super().step(action)
+        k = self._progress.handed
+        if k < self.n_books and self._progress.placed >= k and self._is_clear(self._drawn.handed(k), reached[0]):
+            pose = self._drawn.handed(k).vector
+            self.sim.put(k, pose)
+            self._progress.hand_over(pose)
+        return reached
+
+    def _is_clear(self, place: Pose, observation: Observation) -> bool:
+        """Whether the whole robot is away from where a book is to be put."""
+        book = pack([Obstacle(Box(BOOK_SIZE), place)])
+        return all(
+            arm_room(arm, body, q, book) >= CLEAR
+            for arm, body, q in zip(self.arms, self._task.bodies, observation["joint_positions"], strict=True)
+        )
+
+    def _legs(self, start: Start) -> list[Leg]:
+        """The carries: from above the stand to before the slot."""
+        legs = []
+        for k, goal in enumerate(self._goal_pose):
+            grasp, release = self._drawn.handed(k) @ GRASP, Pose.from_vector(goal) @ GRASP
+            up = Pose.from_position_quaternion([0.0, 0.0, LIFT])
+            back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
+            keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
+            held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
+            legs.append(Leg(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD))
+        return legs
+
+    def _paper(self, legs: list[Leg]) -> list[Order]:
+        """One appears while the last but one book is carried, another one, of another size, with the last."""
+        last = len(legs) - 1
+        return [Order("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
+
+    def _ghosts(self) -> list[Ghost]:
+        return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose]
+
+    def _goals(self) -> tuple[np.ndarray, float]:
+        return self._goal_pose.copy(), self._progress.motion_index
+
+    def _more_observed(self, state: State) -> Observation:
+        return {"furniture_pose": self._furniture.copy()}
+
+    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
+        progress = self._progress
+        verdict = progress.update(state)
+        if verdict.unwanted:
+            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
+        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
+        return reward, progress.success or verdict.fallen == 1, progress.info()
