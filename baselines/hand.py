@@ -70,7 +70,7 @@ class Hand:
 
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
         """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
-        self.surroundings.allowed = tuple(contacts)
+        self.surroundings.allow(contacts)
 
     def follow(self, path: PosePath, *, loosely: bool = False) -> Actions:
         """Follow a path to its end, round what is in the way.

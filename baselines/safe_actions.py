@@ -82,7 +82,7 @@ class SafeActions(gym.Wrapper):
         if self._layer is None or self._key[0] is not obstacles or self._key[1] != near:
             self._key = (obstacles, near)
             task = self._task
-            allowed = [("fingers", name) for name in near]
+            allowed = [*task.touching, *(("fingers", name) for name in near)]
             before, self._layer = self._layer, SafetyLayer(
                 task.arms, task.bodies, obstacles, task.control_dt,
                 settings=self.settings, allowed=allowed, pairs=self._pairs,

@@ -6,8 +6,28 @@ from xml.etree.ElementTree import Element, SubElement
 
 STIFFNESS, DAMPING = 40.0, 0.04
 """Servo stiffness per torque limit [1/rad], and damping per stiffness [s]: the lag of the servo."""
-MAX_COMMAND = 3.0
-"""Largest commanded joint speed [rad/s]."""
+MAX_COMMAND = 5.0
+"""Largest commanded joint speed [rad/s]; what an action can ask for is bound by the robot's own limits."""
+ENDLESS = 6.28318
+"""Limit [rad] given to joints that have none: observations are bounded."""
+ALWAYS_TOUCH = (
+    ("_link0", "_link1"),
+    ("_arm_base_link", "_l0"),
+    ("_inner_finger", "_inner_knuckle"),
+    ("_outer_knuckle", "_inner_knuckle"),
+)
+"""Endings of the names of neighboring links that touch in every posture."""
+
+
+def mend_robot(root: Element) -> None:
+    """Give endless joints limits, and a pedestal its own shape: its mesh would be collided with as a ball."""
+    for joint in root.iter("joint"):
+        if (joint.get("name") or "").startswith("robot") and joint.get("range") is None:
+            joint.set("limited", "true")
+            joint.set("range", f"{-ENDLESS} {ENDLESS}")
+    for geom in root.iter("geom"):
+        if (geom.get("name") or "").endswith("_pedestal_collision"):
+            geom.set("type", "mesh")
 
 
 def use_velocity_servos(root: Element, joints: set[str]) -> None:
@@ -42,14 +62,16 @@ def use_velocity_servos(root: Element, joints: set[str]) -> None:
 
 
 def leave_out_unused(root: Element) -> None:
-    """Remove what costs time at every step and says nothing: force sensors, a link touching its own base."""
+    """Remove what costs time at every step and says nothing: force sensors, links touching their neighbors."""
     for sensor in root.findall("sensor"):
         root.remove(sensor)
     names = [body.get("name") or "" for body in root.iter("body")]
     contact = root.find("contact")
     if contact is None:
         contact = SubElement(root, "contact")
-    for name in names:
-        # MuJoCo leaves out contacts of a link with its parent, but not where the parent is fixed to the world
-        if name.endswith("_link0") and f"{name[:-1]}1" in names:
-            SubElement(contact, "exclude", {"body1": name, "body2": f"{name[:-1]}1"})
+    # MuJoCo leaves out contacts of a link with its parent, but not where the parent is fixed to the world
+    for first, second in ALWAYS_TOUCH:
+        for name in names:
+            other = name.removesuffix(first) + second
+            if name.endswith(first) and other in names:
+                SubElement(contact, "exclude", {"body1": name, "body2": other})

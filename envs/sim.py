@@ -11,7 +11,8 @@ import numpy as np
 from ..planner.chain import FRAME
 from .nearness import Nearness
 from .obstacles import Intruder, ObstacleSlots
-from .scene import FIRST_OBJECT, ArmIndex, compiled_scene
+from .arm_index import ArmIndex
+from .scene import FIRST_OBJECT, compiled_scene
 from .state import State, command, read_arms, read_objects
 from .things import Things
 
@@ -39,8 +40,8 @@ class Start(NamedTuple):
 class Simulation:
     """A scene being simulated: state in, physics, state out."""
 
-    def __init__(self, robot: str, things: Things):
-        self.scene = compiled_scene(robot, things)
+    def __init__(self, robot: str, things: Things, arms: tuple[str, ...] | None = None):
+        self.scene = compiled_scene(robot, things, arms)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         arms, data, model = self.scene.arms, self.data, self.model
@@ -66,11 +67,12 @@ class Simulation:
     def reset(self, start: Start) -> None:
         """Put everything in place, at rest, with open grippers."""
         mujoco.mj_resetData(self.model, self.data)
-        for arm, q in zip(self.scene.arms, start.joints, strict=True):
+        arms, joints = (*self.scene.arms, *self.scene.parked), (*start.joints, *self.scene.parked_joints)
+        for arm, q in zip(arms, joints, strict=True):
             self.data.qpos[arm.qpos] = q
             self.data.act[arm.act] = q
             self.data.ctrl[arm.grip] = arm.opened
-            self.data.qpos[arm.finger_qpos] = arm.opened
+            self.data.qpos[arm.finger_qpos] = arm.finger_open
         for address, pose in zip(self._object_places, start.objects, strict=True):
             self.data.qpos[address : address + 7] = pose
         if len(start.furniture):
@@ -134,9 +136,9 @@ class Simulation:
         return abs(float((left - right) @ closing))
 
     def _measured_opening(self, arm: ArmIndex) -> float:
-        """Gap of the open pads [m]; leaves the gripper open in the state."""
+        """Gap of the open pads [m]; leaves the grippers open in the state."""
         mujoco.mj_resetData(self.model, self.data)
         for each in self.scene.arms:
-            self.data.qpos[each.finger_qpos] = each.opened
+            self.data.qpos[each.finger_qpos] = each.finger_open
         mujoco.mj_forward(self.model, self.data)
         return mujoco.mj_geomDistance(self.model, self.data, *arm.pads, 1.0, None)
