@@ -31,6 +31,7 @@ class ArmIndex:
         closed: their controls when closed.
         finger_qpos: addresses of the finger joints.
         finger_open: their positions when open.
+        finger_inwards: 1 or -1, which way each closes; 0 where it hangs on a linkage.
     """
 
     side: str
@@ -48,6 +49,7 @@ class ArmIndex:
     closed: np.ndarray
     finger_qpos: np.ndarray
     finger_open: np.ndarray
+    finger_inwards: np.ndarray
 
 
 def arm_index(model: mujoco.MjModel, rob: Any, side: str, speeds: tuple[float, ...], name: str) -> ArmIndex:
@@ -79,7 +81,8 @@ def arm_index(model: mujoco.MjModel, rob: Any, side: str, speeds: tuple[float, .
         opened=opened,
         closed=closed,
         finger_qpos=model.jnt_qposadr[finger_joints],
-        finger_open=_open_fingers(model, grip, opened, finger_joints),
+        finger_open=_fingers_at(model, grip, opened, finger_joints),
+        finger_inwards=np.sign(_fingers_at(model, grip, closed - opened, finger_joints)),
     )
 
 
@@ -103,7 +106,7 @@ def _gripper_controls(model: mujoco.MjModel, gripper: Any, grip: np.ndarray) -> 
     return ends[0], ends[1]
 
 
-def _open_fingers(model: mujoco.MjModel, grip: np.ndarray, opened: np.ndarray, joints: list[int]) -> np.ndarray:
-    """Positions of finger joints when open: as commanded, and 0 for those of a linkage that hang on others."""
-    driven = {int(model.actuator_trnid[k, 0]): value for k, value in zip(grip, opened, strict=True)}
+def _fingers_at(model: mujoco.MjModel, grip: np.ndarray, control: np.ndarray, joints: list[int]) -> np.ndarray:
+    """Positions of finger joints under a control, and 0 for those of a linkage, which hang on others."""
+    driven = {int(model.actuator_trnid[k, 0]): value for k, value in zip(grip, control, strict=True)}
     return np.array([driven.get(joint, 0.0) for joint in joints])

@@ -28,6 +28,7 @@ class Start(NamedTuple):
         furniture: (n_furniture, 7) world poses.
         beads: (n_beads, 3) places [m].
         intruders: the obstacles.
+        grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing round something; nan: it is open.
     """
 
     joints: np.ndarray
@@ -35,6 +36,7 @@ class Start(NamedTuple):
     furniture: np.ndarray = np.zeros((0, 7))
     beads: np.ndarray = np.zeros((0, 3))
     intruders: tuple[Intruder, ...] = ()
+    grips: np.ndarray | None = None
 
 
 class Simulation:
@@ -65,14 +67,13 @@ class Simulation:
         self._no_beads = np.zeros((0, 3))
 
     def reset(self, start: Start) -> None:
-        """Put everything in place, at rest, with open grippers."""
+        """Put everything in place, at rest, with open grippers where none holds something."""
         mujoco.mj_resetData(self.model, self.data)
-        arms, joints = (*self.scene.arms, *self.scene.parked), (*start.joints, *self.scene.parked_joints)
-        for arm, q in zip(arms, joints, strict=True):
-            self.data.qpos[arm.qpos] = q
-            self.data.act[arm.act] = q
-            self.data.ctrl[arm.grip] = arm.opened
-            self.data.qpos[arm.finger_qpos] = arm.finger_open
+        grips = np.full(len(self.scene.arms), np.nan) if start.grips is None else start.grips
+        for arm, q, gap, widest in zip(self.scene.arms, start.joints, grips, self._widest, strict=True):
+            self._put(arm, q, 0.5 * (widest - gap) if np.isfinite(gap) else 0.0)
+        for arm, q in zip(self.scene.parked, self.scene.parked_joints, strict=True):
+            self._put(arm, q, 0.0)
         for address, pose in zip(self._object_places, start.objects, strict=True):
             self.data.qpos[address : address + 7] = pose
         if len(start.furniture):
@@ -83,6 +84,13 @@ class Simulation:
         self.obstacles.reset(start.intruders)
         self._near.reset()
         mujoco.mj_forward(self.model, self.data)
+
+    def _put(self, arm: ArmIndex, q: np.ndarray, inwards: float) -> None:
+        """Put an arm at joints q (dof,), open, or closing with each finger some way [m] inwards."""
+        self.data.qpos[arm.qpos] = q
+        self.data.act[arm.act] = q
+        self.data.ctrl[arm.grip] = arm.closed if inwards else arm.opened
+        self.data.qpos[arm.finger_qpos] = arm.finger_open + inwards * arm.finger_inwards
 
     def advance_obstacles(self, seconds: float, motion: float) -> None:
         """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""

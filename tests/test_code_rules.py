@@ -89,6 +89,7 @@ ENVS_ORDER = [
     "model_parts",
     "table_model",
     "scene",
+    "beads",
     "bodies",
     "obstacles",
     "nearness",
@@ -100,6 +101,10 @@ ENVS_ORDER = [
     "base",
     "stack_rules",
     "stacking",
+    "pour_geometry",
+    "pour_layouts",
+    "pour_rules",
+    "pouring",
     "registration",
     "__init__",
 ]
