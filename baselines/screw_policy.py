@@ -17,6 +17,7 @@ from ..planner.repet import RepetSettings
 from ..planner.safety import SafetySettings
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
+from .pour_program import PourProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
 
@@ -37,6 +38,7 @@ class ScrewSettings:
         settle: seconds of standing still before the gripper moves, so that the servos catch up.
         close: seconds given to closing.
         open: seconds given to opening.
+        drain: seconds of holding a glass tilted.
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -48,12 +50,13 @@ class ScrewSettings:
     settle: float = 0.5
     close: float = 0.5
     open: float = 0.3
+    drain: float = 1.5
 
     def __post_init__(self):
         for name in ("resample", "trim"):
             if not getattr(self, name) > 0:
                 raise BadOption(name, f"{getattr(self, name)} is not a positive number")
-        for name in ("release_height", "settle", "close", "open"):
+        for name in ("release_height", "settle", "close", "open", "drain"):
             if getattr(self, name) < 0:
                 raise BadOption(name, f"{getattr(self, name)} is negative")
 
@@ -64,13 +67,13 @@ class ScrewSettings:
         return ReactiveSettings(plan=plan, patience=self.motion.pursuit.patience)
 
 
-PROGRAMS = {"stack": StackProgram}
+PROGRAMS = {"stack": StackProgram, "pour": PourProgram}
 
 
 class Episode:
     """What the policy remembers of an episode: the hand, the running program and how it ended."""
 
-    def __init__(self, hand: Hand, program: StackProgram):
+    def __init__(self, hand: Hand, program: StackProgram | PourProgram):
         self.hand, self.program = hand, program
         self.actions: Iterator[np.ndarray] | None = program.actions()
         self.ended = PolicyReport()

@@ -50,6 +50,9 @@ def releases(target: TaskObject, goal: Pose, tcp_from_object: Pose, height: floa
 class StackProgram:
     """The program of one episode; iterate over `actions()`."""
 
+    SEGMENTS = ("approach", "transfer")
+    """What a demonstration of this task must have."""
+
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
         step = settings.resample

@@ -15,6 +15,7 @@ from .policy import Observation
 TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Distances [m] to keep from what the task itself brings close: things are put down there."""
+INTRUDERS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
 LAG = 0.05
 """Seconds by which the arm is behind its commands."""
 MOVED = 1e-3
@@ -38,6 +39,7 @@ class Surroundings:
         self._task, self._held, self._margin = task, None, margin
         self._fixed = tuple(replace(f, margin=table_margin) if f.name == TABLE else f for f in task.fixtures)
         self._poses = np.full((len(task.objects) + len(task.furniture), 7), np.inf)
+        self._intruders = np.zeros((task.obstacles, 15))
         self._things: tuple[Obstacle, ...] = ()
         self._seen: tuple[Obstacle, ...] = ()
 
@@ -58,12 +60,13 @@ class Surroundings:
         moved = np.abs(poses - self._poses).max(axis=1) > MOVED
         if self._held is not None:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
-        intruders = intruders_of(observation)
+        intruders = np.column_stack([observation[key].reshape(len(self._intruders), -1) for key in INTRUDERS])
         if moved.any():
             self._poses[:] = poses
             self._things = self._renewed(poses)
-        if moved.any() or intruders or len(self._seen) > len(self._things):
-            self._seen = (*self._things, *intruders) if intruders else self._things
+        if moved.any() or (intruders != self._intruders).any():
+            self._intruders = intruders
+            self._seen = (*self._things, *intruders_of(observation))
         return self._seen
 
     def _renewed(self, poses: np.ndarray) -> tuple[Obstacle, ...]:

@@ -35,7 +35,7 @@ def run(
 ) -> None:
     """Run episodes of a config and write a report, a figure and a video.
 
-    Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, n_blocks, max_seconds,
+    Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
     video, settings. Keys with dots reach into settings: settings.motion.guide=0.2
 
     Finished episodes are kept: running the same config again goes on where it stopped. The last line on
@@ -87,6 +87,29 @@ def perf(
     from .perf import run_perf
 
     raise typer.Exit(run_perf(only, json))
+
+
+@app.command()
+def tasks(
+    write: Annotated[Path | None, typer.Option("--write", help="Write a page for each task into this folder.")] = None,
+    clips: Annotated[bool, typer.Option("--clips", help="With --write: also record a looping clip of each.")] = False,
+) -> None:
+    """List the environments, or write a documentation page for each.
+
+    A page is the environment's docstring: actions, observations, rewards, starts, ends, options.
+
+    Examples:
+    - onedemo tasks
+
+    - onedemo tasks --write docs/tasks --clips
+    """
+    from .task_pages import list_tasks, write_pages
+
+    if write is None:
+        list_tasks()
+        return
+    for file in write_pages(write, clips=clips):
+        console().print(str(file))
 
 
 @app.command()

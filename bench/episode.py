@@ -16,6 +16,8 @@ from .statistics import median, quantile
 
 GRACE_SECONDS = 2.0
 """Time that the simulator gets to judge after a policy has declared that it is done."""
+COMMON = ("is_success", "success", "safe", "n_contacts", "min_obstacle_distance", "layouts_refused")
+"""Numbers and flags in `info` that every task has."""
 Observer = Callable[[Any, Any], None]
 """Called with the environment and the observation at the start and after every step."""
 
@@ -57,8 +59,10 @@ def run_episode(
         detail=detail,
         collision=info["collision"],
         seconds=round(dt * steps, 6),
-        position_error=[float(value) for value in info["position_error"]],
-        yaw_error=[float(value) for value in info["yaw_error"]],
+        contacts=int(info["n_contacts"]),
+        clearance=clearance if np.isfinite(clearance := float(info["min_obstacle_distance"])) else None,
+        refused=int(info["layouts_refused"]),
+        numbers=numbers_of(info),
         wall_seconds=time.perf_counter() - started,
         tick_us=[1e6 * value for value in (median(ticks), quantile(ticks, 0.99), max(ticks))],
     )
@@ -71,16 +75,27 @@ def failure(info: dict[str, Any], report: PolicyReport, seconds: float) -> tuple
         return "", ""
     if report.failure_reason:
         return report.failure_reason, report.detail
-    worst = (
-        f"largest error {1e3 * np.max(info['position_error']):.1f} mm, {np.degrees(np.max(info['yaw_error'])):.1f} deg"
-    )
+    worst = ", ".join(f"{key} {_said(values)}" for key, values in numbers_of(info).items())
     if info["failure_reason"]:
         return info["failure_reason"], worst
     if info["collision"]:
         return "collision", f"{info['collision']}; {worst}"
     if report.done:
-        return "constraint", f"placed, but not within tolerance; {worst}"
+        return "constraint", f"done, but not within tolerance; {worst}"
     return "timeout", f"not finished after {seconds:.0f} s; {worst}"
+
+
+def numbers_of(info: dict[str, Any]) -> dict[str, list[float]]:
+    """The task's own numbers: what is in `info` besides what every task has."""
+    return {
+        key: [float(entry) for entry in np.ravel(value)]
+        for key, value in info.items()
+        if key not in COMMON and isinstance(value, int | float | np.ndarray)
+    }
+
+
+def _said(values: list[float]) -> str:
+    return " ".join(f"{value:.3g}" for value in values)
 
 
 def _report(policy: Policy, state: Any) -> PolicyReport:

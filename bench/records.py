@@ -43,8 +43,10 @@ class EpisodeRecord:
         detail: one line for the reader.
         collision: the last unwanted contact, "" if there was none.
         seconds: simulated.
-        position_error: per object [m].
-        yaw_error: per object [rad].
+        contacts: control steps in which the robot or an object touched an obstacle.
+        clearance: smallest distance of the robot, or of what it held, to an obstacle [m]; None: there was none.
+        refused: starts that were drawn and had no room for the obstacles.
+        numbers: the task's own, as in `info`, each a list.
         wall_seconds: real time; not part of the result.
         tick_us: median, 99th percentile and largest time of the policy per tick [us]; not part of the result.
     """
@@ -62,8 +64,10 @@ class EpisodeRecord:
     detail: str
     collision: str
     seconds: float
-    position_error: list[float]
-    yaw_error: list[float]
+    contacts: int
+    clearance: float | None
+    refused: int
+    numbers: dict[str, list[float]]
     wall_seconds: float
     tick_us: list[float]
 

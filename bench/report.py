@@ -10,13 +10,16 @@ from typing import Any
 from ..configs.schema import RunConfig
 from .records import EpisodeRecord
 from .statistics import median, wilson
+from .tasks import TASKS
 
 
 def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
     """The numbers of one cell: method, task, robot, level and what came of it; None where there is nothing to tell."""
     successes = sum(record.success for record in records)
     low, high = wilson(successes, len(records))
-    worst = [1e3 * max(record.position_error) for record in records if record.success]
+    error = TASKS[config.task].error
+    worst = [error.factor * max(record.numbers[error.key]) for record in records if record.success]
+    clearances = [1e3 * record.clearance for record in records if record.clearance is not None]
     return {
         "method": config.method,
         "task": config.task,
@@ -28,10 +31,14 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
         "wilson_low": round(low, 4),
         "wilson_high": round(high, 4),
         **_middle_and_most("seconds", [record.seconds for record in records]),
-        **_middle_and_most("position_error_mm", worst),
+        "error": f"{error.words} [{error.unit}]",
+        **_middle_and_most("error", worst),
         **_middle_and_most("tick_us", [record.tick_us[0] for record in records]),
         "tick_us_p99": _middle([record.tick_us[1] for record in records]),
         "tick_us_max": max((record.tick_us[2] for record in records), default=None),
+        "touching": sum(record.contacts > 0 for record in records),
+        "clearance_mm_min": min(clearances, default=None),
+        "refused": sum(record.refused for record in records),
         "failures": dict(Counter(record.failure_reason for record in records if not record.success)),
     }
 
@@ -45,17 +52,30 @@ def _middle_and_most(key: str, values: list[float]) -> dict[str, float | None]:
 
 
 def verdict(row: dict[str, Any]) -> list[str]:
-    """Three lines for the terminal and the top of the report."""
+    """Lines for the terminal and the top of the report."""
     failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
     times = f"{_said(row['tick_us_median'], '.0f')} us per tick (median), {_said(row['tick_us_p99'], '.0f')} us (p99)"
-    error = row["position_error_mm_max"]
-    largest = "no success, so no error" if error is None else f"largest position error {error:.1f} mm in the successes"
+    what, _, unit = row["error"].rpartition(" [")
+    most = row["error_max"]
+    largest = "no success, so no error" if most is None else f"{what} {most:.1f} {unit[:-1]} in the successes"
     return [
         f"{row['successes']} of {row['episodes']} succeeded at {row['level']} "
         f"(Wilson 95 %: {row['wilson_low']:.2f} to {row['wilson_high']:.2f}), "
         f"{row['safe_successes']} without any unwanted contact",
         f"{_said(row['seconds_median'])} s simulated per episode (median), {largest}",
         f"planner {times}; failures: {failures}",
+        *_beside_obstacles(row),
+    ]
+
+
+def _beside_obstacles(row: dict[str, Any]) -> list[str]:
+    """A line about obstacles, if there were any."""
+    if row["clearance_mm_min"] is None and not row["refused"]:
+        return []
+    drawn = row["episodes"] + row["refused"]
+    return [
+        f"obstacles touched in {row['touching']} of {row['episodes']} episodes, smallest distance "
+        f"{_said(row['clearance_mm_min'])} mm; {row['refused']} of {drawn} starts had no room for them"
     ]
 
 
@@ -88,9 +108,8 @@ def report_text(
 
 
 def _table(row: dict[str, Any]) -> str:
-    head = "| method | task | robot | level | episodes | success | safe success | Wilson 95 % | time [s] | error [mm] |"
+    head = "| method | task | robot | level | episodes | success | safe success | Wilson 95 % | time [s] | error |"
     line = "|---|---|---|---|---|---|---|---|---|---|"
-    error = "position_error_mm_"
     cells = (
         row["method"],
         row["task"],
@@ -101,7 +120,9 @@ def _table(row: dict[str, Any]) -> str:
         row["safe_successes"],
         f"{row['wilson_low']:.2f} to {row['wilson_high']:.2f}",
         f"{_said(row['seconds_median'])} (max {_said(row['seconds_max'])})",
-        "no success" if not row["successes"] else f"{_said(row[error + 'median'])} (max {_said(row[error + 'max'])})",
+        "no success"
+        if not row["successes"]
+        else f"{row['error']} {_said(row['error_median'])} (max {_said(row['error_max'])})",
     )
     return "\n".join([head, line, "| " + " | ".join(_cell(cell) for cell in cells) + " |"])
 

@@ -7,6 +7,7 @@ import json
 import warnings
 from contextlib import ExitStack
 from dataclasses import asdict
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from .console import COMMAND_LINE, console, labeled
 from .demo_commands import demonstration_path
 from .records import FILE, EpisodeRecord, RecordWriter, locked, read_records
 from .scenarios import scenarios_of
+from .tasks import TASKS
 
 if TYPE_CHECKING:
     from ..baselines.policy import Policy
@@ -24,9 +26,8 @@ if TYPE_CHECKING:
 
 DISK_FULL, INTERRUPTED = 3, 130
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-IDS = {"stack": "onedemo/Stack-v0"}
-MOTIONS = {"stack": ("approach", "transfer")}
-"""Segments that a demonstration of a task must have."""
+RUN_KEYS = ("robot", "level", "obstacles", "render_mode")
+"""Arguments of environments that are keys of a config themselves."""
 
 
 def run_config(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
@@ -91,7 +92,7 @@ def _open_folder(folder: Path, held: ExitStack) -> None:
 def _built(config: RunConfig, source: Path, overrides: list[str], err: Any) -> tuple[Any, Policy]:
     """The environment and the policy, and what is being waited for."""
     with err.status("building the scene and the planner (compiled on first use: about half a minute)"):
-        return _prepared(config, source, overrides)
+        return prepared(config, source, overrides)
 
 
 def _run(env: Any, policy: Policy, config: RunConfig, folder: Path, command: str, err: Any) -> list[str]:
@@ -100,29 +101,23 @@ def _run(env: Any, policy: Policy, config: RunConfig, folder: Path, command: str
     return _report(env, policy, config, folder, records, command, err)
 
 
-def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any, Policy]:
-    """The environment and the policy; what the config names wrongly becomes an error with its key."""
-    import gymnasium as gym
+def prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any, Policy]:
+    """The environment and the policy of a config, compiled and warm.
 
-    from .. import envs  # noqa: F401  (registers the ids)
+    Raises:
+        BadConfig: the config names something wrongly; with its key.
+        BadDemonstration: the demonstration is of something else.
+    """
     from ..baselines.factory import make_policy
+    from ..baselines.screw_policy import PROGRAMS
     from ..planner import motions, reactive
     from ..planner.demo_io import load_demonstration
 
     _check_names(config, source, overrides)
     file = demonstration_path(config.demonstration)
     demonstration = load_demonstration(file)
-    _check_demonstration(demonstration, file, config.task)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        env: Any = gym.make(
-            IDS[config.task],
-            robot=config.robot,
-            level=config.level,
-            n_blocks=config.n_blocks,
-            render_mode="rgb_array" if config.video else None,
-            max_episode_steps=max(1, round(config.max_seconds * 50)),
-        )
+    _check_demonstration(demonstration, file, config.task, PROGRAMS[config.task].SEGMENTS)
+    env: Any = _made(config, source)
     task = env.unwrapped.task
     for arm, body in zip(task.arms, task.bodies, strict=True):
         motions.warm_up(arm)
@@ -130,29 +125,63 @@ def _prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[An
     return env, make_policy(config.method, task, demonstration, config.settings)
 
 
+def _made(config: RunConfig, source: Path) -> Any:
+    """The environment of a config.
+
+    Raises:
+        BadConfig: the environment does not know an argument.
+    """
+    import gymnasium as gym
+    from gymnasium.envs.registration import load_env_creator
+
+    from .. import envs  # noqa: F401  (registers the ids)
+
+    name = TASKS[config.task].id
+    known = [
+        key for key in signature(load_env_creator(str(gym.spec(name).entry_point))).parameters if key not in RUN_KEYS
+    ]
+    for key in config.env:
+        if key not in known:
+            reason = f"{name} has no such argument; allowed: {', '.join(known) or 'none'}"
+            raise BadConfig(source, f"env.{key}", reason)
+    limit = None if config.max_seconds is None else max(1, round(config.max_seconds * 50))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return gym.make(
+            name,
+            robot=config.robot,
+            level=config.level,
+            obstacles=config.obstacles,
+            render_mode="rgb_array" if config.video else None,
+            max_episode_steps=limit,
+            **config.env,
+        )
+
+
 def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
     """Refuse unknown names, and say where they were written."""
     from ..baselines.factory import POLICIES
-    from ..envs.levels import LEVELS
+    from ..envs.levels import LEVELS, OBSTACLES
     from ..envs.scene import ROBOTS
 
     changed = {text.partition("=")[0] for text in overrides}
-    for key, known in (("task", IDS), ("level", LEVELS), ("robot", ROBOTS), ("method", POLICIES)):
+    names = {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
+    for key, known in names.items():
         value = getattr(config, key)
         if value not in known:
             where = COMMAND_LINE if key in changed else source
-            raise BadConfig(where, key, f"unknown {key} {value!r}; known: {', '.join(known)}")
+            raise BadConfig(where, key, f"unknown {key} {value!r}; known: {', '.join(map(str, known))}")
 
 
-def _check_demonstration(demonstration: Demonstration, file: Path, task: str) -> None:
+def _check_demonstration(demonstration: Demonstration, file: Path, task: str, segments: tuple[str, ...]) -> None:
     """Refuse a demonstration of something else."""
     if demonstration.task != task:
         raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
     names = [segment.name for segment in demonstration.segments]
-    for name in MOTIONS[task]:
+    for name in segments:
         if name not in names:
             there = ", ".join(names) or "none"
-            reason = f"{name!r} is missing; {task!r} needs {', '.join(MOTIONS[task])}, there are: {there}"
+            reason = f"{name!r} is missing; {task!r} needs {', '.join(segments)}, there are: {there}"
             raise BadDemonstration(file, "segment_names", reason)
 
 

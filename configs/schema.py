@@ -26,8 +26,9 @@ class RunConfig(BaseModel):
         level: how far they differ from the demonstration.
         robot: robosuite's name.
         seed: scenario k has the seed `seed + k`.
-        n_blocks: objects to stack.
-        max_seconds: simulated time limit of an episode.
+        obstacles: their kind; None: what the level says.
+        env: more arguments of the environment, like `n_blocks` of stacking.
+        max_seconds: simulated time limit of an episode; None: the task's own.
         video: make a video of the first episode.
         settings: of the method; see its own settings for the keys.
     """
@@ -42,8 +43,9 @@ class RunConfig(BaseModel):
     level: str = "L1"
     robot: str = "Panda"
     seed: Annotated[int, Field(ge=0, le=2**31)] = 0
-    n_blocks: Annotated[int, Field(ge=2, le=6)] = 3
-    max_seconds: Annotated[float, Field(gt=0, le=3600)] = 60.0
+    obstacles: str | None = None
+    env: dict[str, Any] = Field(default_factory=dict)
+    max_seconds: Annotated[float, Field(gt=0, le=3600)] | None = None
     video: bool = True
     settings: dict[str, Any] = Field(default_factory=dict)
 

@@ -142,7 +142,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         wanted = checked_obstacles(options.pop("obstacles", wanted), SLOTS)
         self._refused = 0
         for _ in range(MAX_LAYOUTS):
-            start = self._start(dict(options), level.layout, wanted != "none")
+            start = self._start(dict(options), level.layout, isinstance(wanted, str) and wanted != "none")
             intruders = wanted if isinstance(wanted, tuple) else self._intruders(wanted, start)
             if intruders is not None:
                 return start._replace(intruders=intruders)

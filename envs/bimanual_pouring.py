@@ -184,6 +184,7 @@ class BimanualPourEnv(OneDemoEnv):
             table_height=TABLE_HEIGHT,
             fixtures=parts.fixtures,
             gripper_width=widths,
+            obstacles=SLOTS,
             touching=parts.touching,
         )
         self._solids = pack(parts.fixtures)

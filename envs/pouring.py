@@ -167,6 +167,7 @@ class PourEnv(OneDemoEnv):
             fixtures=self.sim.scene.fixtures,
             gripper_width=widths,
             furniture=tuple(TaskFurniture.of(each) for each in STANDS),
+            obstacles=SLOTS,
         )
         self._place(self._nominal)
 
@@ -196,7 +197,8 @@ class PourEnv(OneDemoEnv):
                 raise UnknownName("reset option", key, OPTIONS)
         given = checked_stands(options["stands"], self._axis) if "stands" in options else None
         wanted = checked_joints(options["joint_positions"], self.arms) if "joint_positions" in options else None
-        ranges, gap = RANGES[layout], LONG_GAP if spacious else GAP
+        ranges = RANGES[layout]
+        gap = LONG_GAP if spacious and ranges.source else GAP
         for _ in range(MAX_STARTS):
             tops = pour_layout(self.np_random, ranges, self._nominal, self._axis, gap) if given is None else given
             offsets = self.np_random.uniform(-ranges.joints, ranges.joints, self._ready.shape)

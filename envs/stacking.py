@@ -150,6 +150,7 @@ class StackEnv(OneDemoEnv):
             table_height=TABLE_HEIGHT,
             fixtures=parts.fixtures,
             gripper_width=widths,
+            obstacles=SLOTS,
             touching=parts.touching,
         )
         self._goal_pose = np.zeros((n_blocks, 7))
@@ -166,7 +167,7 @@ class StackEnv(OneDemoEnv):
                 raise UnknownName("reset option", key, OPTIONS)
         home = self.sim.scene.home
         axis = self.arms[0].chain[0, 4:6]
-        gap = LONG_GAP if spacious else BASE_GAP
+        gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
         drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap, self._reach)
         poses, base = _poses(drawn)
         if "object_poses" in options:

@@ -98,6 +98,7 @@ class TaskDescription:
         gripper_width: largest distance between the finger pads [m], one per arm.
         furniture: in the order of `furniture_pose`.
         touching: pairs (part of a body, fixture) that are always so near that nobody needs to look: shoulders and trunk.
+        obstacles: how many there can be, the length of `obstacle_active`.
     """
 
     name: str
@@ -111,3 +112,4 @@ class TaskDescription:
     gripper_width: tuple[float, ...]
     furniture: tuple[TaskFurniture, ...] = ()
     touching: tuple[tuple[str, str], ...] = ()
+    obstacles: int = 0

@@ -20,8 +20,10 @@ RECORD = EpisodeRecord(
     detail="",
     collision="",
     seconds=21.5,
-    position_error=[0.001, 0.002],
-    yaw_error=[0.01, 0.02],
+    contacts=0,
+    clearance=None,
+    refused=0,
+    numbers={"position_error": [0.001, 0.002], "yaw_error": [0.01, 0.02]},
     wall_seconds=0.5,
     tick_us=[12.0, 60.0, 9000.0],
 )

@@ -81,7 +81,7 @@ def test_one_demonstration_stacks_three_blocks(env, level, seed):
     record, report = run_episode(env, a_policy(env), Scenario(0, seed, level), CONFIG)
     assert (record.success, record.safe, record.stage) == (True, True, "placed 3 of 3")
     assert record.seconds < 35
-    assert max(record.position_error) < 0.01
+    assert max(record.numbers["position_error"]) < 0.01
     labels = [path.motion for path in report.paths if path.label == "final"]
     assert labels == [f"{verb} block{k}" for k in range(3) for verb in ("fetch", "place")]
 

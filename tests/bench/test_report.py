@@ -43,7 +43,7 @@ def test_a_row_counts_what_happened(tmp_path):
     assert set(REQUIRED) <= set(row)
     assert (row["episodes"], row["successes"], row["safe_successes"]) == (6, 5, 4)
     assert row["failures"] == {"dropped": 1}
-    assert row["position_error_mm_max"] == pytest.approx(2.0)
+    assert row["error_max"] == pytest.approx(2.0)
     write_summary(tmp_path / "summary.json", [row])
     assert json.loads((tmp_path / "summary.json").read_text())["rows"][0]["successes"] == 5
     assert len(verdict(row)) == 3
@@ -69,7 +69,7 @@ def test_a_run_without_any_success_says_so_in_words_and_null(tmp_path):
     assert "nan" not in text.lower().replace("explanation", "")
     write_summary(tmp_path / "summary.json", [row])
     written = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)["rows"][0]
-    assert written["position_error_mm_median"] is written["position_error_mm_max"] is None
+    assert written["error_median"] is written["error_max"] is None
     assert written["seconds_median"] == FAILED.seconds
 
 

@@ -24,7 +24,7 @@ BAD = {
     "bool as seed": (GOOD + "seed: true\n", "seed: .*integer, got True"),
     "number as bool": (GOOD + "video: 1\n", "video: .*boolean, got 1"),
     "no is a text": (GOOD + "video: no\n", "video: .*boolean, got 'no'"),
-    "too many blocks": (GOOD + "n_blocks: 7\n", "n_blocks: .*less than or equal to 6"),
+    "a list as arguments": (GOOD + "env: [n_blocks]\n", "env: .*dictionary"),
     "list as level": (GOOD + "level: [L1]\n", "level: .*string"),
     "null as level": (GOOD + "level:\n", "level: .*string"),
     "name with slash": (GOOD.replace("mine", "../mine"), "name: .*pattern"),

@@ -1,0 +1,115 @@
+"""`onedemo tasks`: the environments in the terminal, and a documentation page for each, made from its docstring."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any
+
+from .console import console, writing
+from .tasks import TASKS
+
+CLIP_SIZE = (480, 360)
+CLIP_SECONDS = 8.0
+"""Length of a clip; the episode is played as fast as that needs."""
+CLIP_FRAMES = 96
+CLIP_QUALITY = 55
+
+
+def list_tasks() -> None:
+    """Print id, meaning, robots and time limit of every environment."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in ("id", "what it is", "seconds", "config"):
+        table.add_column(head, no_wrap=head == "id")
+    for name, facts in TASKS.items():
+        limit = _spec(facts.id).max_episode_steps or 0
+        table.add_row(facts.id, summary_of(facts.id), f"{limit / 50:.0f}", f"onedemo run {name}")
+    console().print(table, soft_wrap=False)
+
+
+def environment_class(identifier: str) -> type:
+    """The class behind an id; the simulator is loaded."""
+    from gymnasium.envs.registration import load_env_creator
+
+    made: Any = load_env_creator(str(_spec(identifier).entry_point))
+    return made
+
+
+def summary_of(identifier: str) -> str:
+    """The first sentence of an environment's docstring."""
+    return " ".join(str(inspect.getdoc(environment_class(identifier))).split("\n\n")[0].split())
+
+
+def page_text(task: str) -> str:
+    """The documentation page of a task's environment as Markdown: its docstring beneath its picture."""
+    facts = TASKS[task]
+    summary, _, rest = str(inspect.getdoc(environment_class(facts.id))).partition("\n\n")
+    parts = [
+        f"# {facts.id}",
+        " ".join(summary.split()),
+        f"![The planner at work on {facts.id}]({task}.webp)",
+        f'```python\nimport gymnasium as gym\nimport onedemo.envs\n\nenv = gym.make("{facts.id}")\n```',
+        rest,
+        f"One run of the planner on it: `onedemo run {task}`.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def write_pages(folder: Path, *, clips: bool) -> list[Path]:
+    """Write the page of every task, and its clip if wanted; the files written."""
+    written = []
+    for task in TASKS:
+        page = folder / f"{task}.md"
+        with writing("--write", page):
+            folder.mkdir(parents=True, exist_ok=True)
+            page.write_text(page_text(task), encoding="utf-8")
+        written.append(page)
+        if clips:
+            written.append(write_clip(task, folder / f"{task}.webp"))
+    return written
+
+
+def write_clip(task: str, file: Path) -> Path:
+    """A looping clip of the planner's first episode of a task's shipped config."""
+    from ..configs.schema import load_config
+    from ..configs.shipped import shipped_config
+    from .episode import run_episode
+    from .run import prepared
+    from .scenarios import scenarios_of
+
+    source = shipped_config(task)
+    config = load_config(source)
+    env, policy = prepared(config, source, [])
+    pictures: list[Any] = []
+    with writing("--write", file):
+        run_episode(
+            env, policy, scenarios_of(config)[0], config, lambda env, _: pictures.append(_picture(env, pictures))
+        )
+        env.close()
+        _save(file, pictures)
+    return file
+
+
+def _picture(env: Any, before: list[Any]) -> Any:
+    """Every tenth state as an image, None for the others."""
+    from PIL import Image
+
+    return Image.fromarray(env.render()).resize(CLIP_SIZE) if len(before) % 10 == 0 else None
+
+
+def _save(file: Path, pictures: list[Any]) -> None:
+    drawn = [picture for picture in pictures if picture is not None]
+    step = max(1, round(len(drawn) / CLIP_FRAMES))
+    kept = drawn[::step]
+    pause = round(1000.0 * CLIP_SECONDS / len(kept))
+    kept[0].save(file, save_all=True, append_images=kept[1:], duration=pause, loop=0, quality=CLIP_QUALITY, method=6)
+
+
+def _spec(identifier: str) -> Any:
+    import gymnasium as gym
+
+    from .. import envs  # noqa: F401  (registers the ids)
+
+    return gym.spec(identifier)
