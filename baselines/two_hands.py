@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from ..envs.task import TaskDescription
 from ..planner import dualquat as dq
-from ..planner.body import Body
+from ..planner.body import FRAME, Body
 from ..planner.body_models import resting_pairs
 from ..planner.controller import Controller
 from ..planner.errors import PlanFailed
@@ -26,6 +27,8 @@ from .policy import Observation
 from .surroundings import TABLE, TABLE_MARGIN, intruders_of
 
 CLOSE = 1.0
+WRIST = 3
+"""Joints between capsules of one arm that are kept apart: across a wrist, whose axes meet, they are always close."""
 Paths = tuple[PosePath, PosePath]
 
 
@@ -55,7 +58,7 @@ class TwoHands:
         self.task, self.settings, self._safety = task, motion, safety
         self.observation, self.arms = observation, task.arms
         self.q = np.array(observation["joint_positions"], dtype=np.float64)
-        self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies)
+        self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies, apart=WRIST)
         self._fixed = tuple(replace(f, margin=TABLE_MARGIN) if f.name == TABLE else f for f in task.fixtures)
         self._controllers = [Controller(arm, motion.controller) for arm in task.arms]
         self._layer = self._renewed_layer()
@@ -74,7 +77,7 @@ class TwoHands:
         )
         names = [name for body in self._bodies for name in body.names]
         meant = {each.name for each in objects}
-        pairs = pairs_of(self.arms, self._bodies)
+        pairs = pairs_of(self.arms, self._bodies, apart=WRIST)
         self._pairs = [(i, j) for i, j in pairs if names[i] == names[j] or not {names[i], names[j]} <= meant]
         self._layer = self._renewed_layer()
 
@@ -149,13 +152,20 @@ class TwoHands:
         )
 
 
-def pairs_of(arms: Sequence, bodies: Sequence[Body]) -> list[tuple[int, int]]:
-    """Capsules, counted through all bodies, that may hit each other: of one arm those apart, of two arms all."""
+def pairs_of(arms: Sequence, bodies: Sequence[Body], *, apart: int = 2) -> list[tuple[int, int]]:
+    """Capsules, counted through all bodies, that may hit each other: of two arms all, of one arm some.
+
+    Args:
+        arms: the arms.
+        bodies: theirs.
+        apart: of one arm only capsules are looked at that so many joints are between, and that do not always touch.
+    """
     pairs, first = [], 0
     starts = np.concatenate([[0], np.cumsum([len(body) for body in bodies])])
     for arm, body in zip(arms, bodies, strict=True):
         resting = {tuple(sorted(pair)) for pair in resting_pairs(arm, body)}
-        own = [(i, j) for i in range(len(body)) for j in range(i + 1, len(body)) if (i, j) not in resting]
+        frames, all_pairs = body.rows[:, FRAME], combinations(range(len(body)), 2)
+        own = [(i, j) for i, j in all_pairs if abs(frames[i] - frames[j]) >= apart and (i, j) not in resting]
         pairs += [(first + i, first + j) for i, j in own]
         first += len(body)
     if len(bodies) == 2:
