@@ -50,7 +50,7 @@ class Robot:
             raise BadOption("robot", f"{name} cannot hold {thing}, {1e3 * width:.0f} mm wide: {can}")
 
     def place(self, arms: tuple[str, ...]) -> tuple[float | None, float]:
-        """x (None: robosuite's) and y [m] of the base, for the arms that work."""
+        """X (None: robosuite's) and y [m] of the base, for the arms that work."""
         alone = len(self.ready) == 2 and len(arms) == 1
         side = 1.0 if next(iter(self.ready)) in arms else -1.0
         return self.stand, side * self.beside if alone else 0.0

@@ -6,6 +6,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 STIFFNESS, DAMPING = 40.0, 0.04
 """Servo stiffness per torque limit [1/rad], and damping per stiffness [s]: the lag of the servo."""
+LEAST_INERTIA = 0.0064
+"""Rotor inertia per torque limit [s2] that a joint has at least: with less, the servo's damping, which counts for a
+whole step of the physics, throws it back and forth at every step."""
 MAX_COMMAND = 5.0
 """Largest commanded joint speed [rad/s]; what an action can ask for is bound by the robot's own limits."""
 ENDLESS = 6.28318
@@ -32,7 +35,7 @@ def mend_robot(root: Element) -> None:
 
 def use_velocity_servos(root: Element, joints: set[str]) -> None:
     """Replace the torque motors of the arms, keeping their names, and free the robot of gravity."""
-    ranges = {joint.get("name"): joint.get("range") for joint in root.iter("joint")}
+    by_name = {joint.get("name"): joint for joint in root.iter("joint")}
     actuators = root.find("actuator")
     assert actuators is not None
     for motor in list(actuators.findall("motor")):
@@ -41,6 +44,8 @@ def use_velocity_servos(root: Element, joints: set[str]) -> None:
             continue
         torque = float(motor.get("ctrlrange", "-80 80").split()[1])
         stiffness = STIFFNESS * torque
+        driven = by_name[joint]
+        driven.set("armature", f"{max(float(driven.get('armature', '0')), LEAST_INERTIA * torque)}")
         motor.tag = "general"
         motor.attrib = {
             "name": motor.get("name", ""),
@@ -52,7 +57,7 @@ def use_velocity_servos(root: Element, joints: set[str]) -> None:
             "ctrllimited": "true",
             "ctrlrange": f"{-MAX_COMMAND} {MAX_COMMAND}",
             "actlimited": "true",
-            "actrange": ranges[joint] or "",
+            "actrange": driven.get("range", ""),
             "forcelimited": "true",
             "forcerange": f"{-torque} {torque}",
         }

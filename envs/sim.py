@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from ..planner.chain import FRAME
+from .arm_index import ArmIndex
 from .nearness import Nearness
 from .obstacles import Intruder, ObstacleSlots
-from .arm_index import ArmIndex
 from .scene import FIRST_OBJECT, compiled_scene
 from .state import State, command, read_arms, read_objects
 from .things import Things

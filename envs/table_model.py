@@ -21,8 +21,8 @@ from robosuite.utils.mjcf_utils import CustomMaterial
 
 from .model_parts import bead_bodies, furniture_body, glass_body, obstacle_bodies, solid_body
 from .servos import leave_out_unused, mend_robot, use_velocity_servos
-from .trunk import slice_trunk
 from .things import TABLE_HALF_SIZE, TABLE_HEIGHT, Glass, Solid, Things, half_sizes
+from .trunk import slice_trunk
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
 FRICTION = (1.0, 0.005, 0.0001)
