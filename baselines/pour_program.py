@@ -208,9 +208,7 @@ class PourProgram:
             raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
         return best
 
-    def _chosen_carry(
-        self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool
-    ) -> tuple[Way, float]:
+    def _chosen_carry(self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool) -> tuple[Way, float]:
         """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
 
         Args:

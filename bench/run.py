@@ -116,7 +116,8 @@ def prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any
     _check_names(config, source, overrides)
     file = demonstration_path(config.demonstration)
     demonstration = load_demonstration(file)
-    _check_demonstration(demonstration, file, config.task, PROGRAMS[config.task].SEGMENTS)
+    shown = TASKS[config.task].shown or config.task
+    _check_demonstration(demonstration, file, shown, PROGRAMS[config.task].SEGMENTS)
     env: Any = _made(config, source)
     task = env.unwrapped.task
     for arm, body in zip(task.arms, task.bodies, strict=True):
