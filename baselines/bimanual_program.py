@@ -23,7 +23,7 @@ from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.tsia import GUIDE_START, final_path, guide_index
 from .policy import LabeledPath
-from .pour_program import Size, lip, lip_direction, standing
+from .pour_goals import Size, lip, lip_direction, standing
 from .two_hands import Paths, RollOut, TwoHands
 
 if TYPE_CHECKING:

@@ -162,7 +162,7 @@ def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
     """Refuse unknown names, and say where they were written."""
     from ..baselines.factory import POLICIES
     from ..envs.levels import LEVELS, OBSTACLES
-    from ..envs.scene import ROBOTS
+    from ..envs.robots import ROBOTS
 
     changed = {text.partition("=")[0] for text in overrides}
     names = {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}

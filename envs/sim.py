@@ -42,8 +42,8 @@ class Start(NamedTuple):
 class Simulation:
     """A scene being simulated: state in, physics, state out."""
 
-    def __init__(self, robot: str, things: Things, arms: tuple[str, ...] | None = None):
-        self.scene = compiled_scene(robot, things, arms)
+    def __init__(self, robot: str, things: Things, sides: tuple[str, ...] | None = None):
+        self.scene = compiled_scene(robot, things, sides)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         arms, data, model = self.scene.arms, self.data, self.model
@@ -53,8 +53,8 @@ class Simulation:
         self._servos = np.array([arm.ctrl for arm in arms])
         self._grips = np.array([np.column_stack([arm.grip, arm.opened, arm.closed]) for arm in arms])
         offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
-        sides = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
-        self._homes = np.column_stack([sides, offsets])
+        attitudes = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
+        self._homes = np.column_stack([attitudes, offsets])
         self._chains = np.array([arm.arm.chain for arm in arms])
         self._frames = np.empty((arms[0].arm.dof, FRAME))
         self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
