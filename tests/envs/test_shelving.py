@@ -104,7 +104,9 @@ def test_a_clutter_book_pushed_over_is_no_success(env, change, over):
     poses = state.object_pose.copy()
     poses[:N] = env._goal_pose
     half = 0.5 * np.deg2rad(change[1])
-    fallen = Pose.from_vector(poses[4]) @ Pose.from_position_quaternion([change[0], 0, 0], [np.cos(half), np.sin(half), 0, 0])
+    fallen = Pose.from_vector(poses[4]) @ Pose.from_position_quaternion(
+        [change[0], 0, 0], [np.cos(half), np.sin(half), 0, 0]
+    )
     poses[4] = fallen.vector
     for _ in range(30):
         verdict = progress.update(state._replace(object_pose=poses, touching=np.zeros_like(state.touching)))
@@ -237,7 +239,10 @@ def test_layouts_keep_their_ranges(seed, name, count):
         ({"stand_pose": [*STANDING[:2], 1.4, *STANDING[3:]]}, "out of reach or not a place; x 0.15, y -0.3 by 0.12 m"),
         ({"stand_pose": [*STANDING[:3], 0.8, 0.6, 0.0, 0.0]}, "'stand_pose': is tilted"),
         ({"stand_pose": [*STANDING[:3], 1.0, 0.0, 0.0, -1.0]}, "has norm 1.41421"),
-        ({"stand_pose": [*STANDING[:3], 0.8, 0.0, 0.0, -0.6]}, "yaw of -74 degrees cannot be reached; allowed: 30 by 45"),
+        (
+            {"stand_pose": [*STANDING[:3], 0.8, 0.0, 0.0, -0.6]},
+            "yaw of -74 degrees cannot be reached; allowed: 30 by 45",
+        ),
         ({"cupboard_pose": [*FRONT[:2], 0.9, *FRONT[3:]]}, "'cupboard_pose': .* not a place"),
         ({"cupboard_pose": [*FRONT[:3], 1.0, 0.0, 0.0, 0.0]}, "yaw of 0 degrees cannot be reached; allowed: 75 by 20"),
         ({"slots": 0.2}, "leave -0.[0-9]+ m beside the slots of the upper shelf; 0.03 m are needed"),
