@@ -1,4 +1,4 @@
-"""The script that shows how a book is shelved: its waypoints, in the open. Recorded in the LOWER shelf."""
+"""The script of the demonstration `shelve`, in the LOWER shelf: its waypoints, in the open. A script moved this arm."""
 
 from __future__ import annotations
 
@@ -23,14 +23,12 @@ SLOW = 0.12
 """Speed into and out of the shelf [m/s]."""
 
 
-def shelve_demonstration(env: Any) -> Demonstration:
-    """One book, shelved by a script in an environment of one book at level L0 with `shelf="lower"`."""
-    observation, _ = env.reset(seed=0)
-    motions = list(_motions(observation, env.task.gripper_width[0]))
-    return recorded(env, observation, motions, name="shelve")
+SCENE = {"n_books": 1, "shelf": "lower"}
+"""Arguments of the environment that the demonstration is given in."""
 
 
-def _motions(observation: dict[str, np.ndarray], width: float) -> Iterator[ScriptedMotion]:
+def shelve_script(observation: dict[str, np.ndarray], width: float) -> Iterator[ScriptedMotion]:
+    """The motions for what is observed, with a gripper that opens to `width` [m]."""
     grasp = Pose.from_vector(observation["object_pose"][0]) @ GRASP
     release = _up(ABOVE) @ Pose.from_vector(observation["goal_pose"][0]) @ GRASP
     lifted, before = _up(LIFT) @ grasp, release @ _along(-WAY_IN)
@@ -50,3 +48,13 @@ def _up(height: float) -> Pose:
 def _along(way: float) -> Pose:
     """A way along the direction that the hand points in, in the hand's frame."""
     return Pose.from_position_quaternion([0.0, 0.0, way])
+
+
+def record_shelve(env: Any) -> Demonstration:
+    """The demonstration, given in `onedemo/Shelve-v0` (unwrapped) made with `SCENE`, at level L0.
+
+    Raises:
+        BadDemonstration: the simulator saw no success.
+    """
+    observation, _ = env.reset(seed=0, options={"level": "L0"})
+    return recorded(env, observation, shelve_script(observation, env.task.gripper_width[0]), name="shelve")

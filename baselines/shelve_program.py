@@ -15,10 +15,10 @@ import numpy as np
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
-from ..planner.motions import Motion, plan_motion
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.tsia import imitated_path
+from .choice import Choice, Leg
 from .hand import CLOSE, OPEN, Hand
 from .policy import LabeledPath
 
@@ -73,13 +73,15 @@ class ShelveProgram:
         return self.hand.object_pose(k).position[2] > self.hand.observation["furniture_pose"][names.index(STAND), 2]
 
     def _fetch(self, k: int) -> Iterator[np.ndarray]:
-        name, reach = self.task.objects[k].name, self._parts["reach"]
+        reach = self._parts["reach"]
         grasp = self.shown.segment("reach").reference_pose.inverse() @ reach[-1]
-        reach = imitated_path(reach, self.hand.object_pose(k) @ grasp)
-        self.hand.allow(())
-        yield from self._imitated("approach", reach[0], name)
-        self.hand.allow((*_around((name,)), ("fingers", STAND)))
-        yield from self.hand.follow(reach)
+        goal = self.hand.object_pose(k) @ grasp
+        touching = (*_around((self.task.objects[k].name,)), ("fingers", STAND))
+        leg = self._leg("approach", k, imitated_path(reach, goal)[0])
+        choice = self.hand.choose(leg, lambda _: self._leg("reach", k, goal, touching))
+        yield from self._done(choice, leg)
+        self.hand.allow(touching)
+        yield from self.hand.follow(imitated_path(reach, goal))
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(CLOSE, self.settings.close)
 
@@ -94,13 +96,16 @@ class ShelveProgram:
 
     def _shelve(self, k: int) -> Iterator[np.ndarray]:
         name = self.task.objects[k].name
-        # the book slips a little while it is lifted: the goal is computed from how it is held now
-        insertion = self._insertion(k)
-        self.hand.allow(())
-        yield from self._imitated("carry", insertion[0], name)
         neighbors = tuple(each.name for each in self.task.objects[:k])
-        self.hand.allow((("held", CUPBOARD), *_around(neighbors)))
-        yield from self.hand.follow(self._insertion(k))
+        touching = (("held", CUPBOARD), *_around(neighbors))
+        # the book slips a little while it is lifted: the goal is computed from how it is held now
+        held = self._held(k)
+        insertion = self._insertion(k, held)
+        leg = self._leg("carry", k, insertion[0], held=held)
+        choice = self.hand.choose(leg, lambda _: self._leg("insert", k, insertion[-1], touching, held))
+        yield from self._done(choice, leg)
+        self.hand.allow(touching)
+        yield from self.hand.follow(self._insertion(k, self._held(k)))
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(self._release, self.settings.open)
         self.hand.release()
@@ -109,25 +114,28 @@ class ShelveProgram:
     def _retreat(self) -> Iterator[np.ndarray]:
         yield from self.hand.follow(self._from_here("retreat"), loosely=True)
 
-    def _insertion(self, k: int) -> PosePath:
+    def _insertion(self, k: int, held: Pose) -> PosePath:
         """The demonstrated insertion, to where the hand lets go so that the book is in its slot."""
-        goal = self.hand.goal_pose(k) @ self._held(k).inverse()
         above = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height])
-        return imitated_path(self._parts["insert"], above @ goal)
+        return imitated_path(self._parts["insert"], above @ self.hand.goal_pose(k) @ held.inverse())
 
     def _from_here(self, name: str) -> PosePath:
         path = self._parts[name]
         return path.moved(self.hand.arm.fk(self.hand.q) @ path[0].inverse())
 
-    def _imitated(self, name: str, goal: Pose, what: str) -> Iterator[np.ndarray]:
-        motion = self._planned(name, goal)
-        if not motion.arrives:
-            raise PlanFailed(motion.reason, f"{name} of {what} cannot be done along the demonstration")
-        self.paths.append(LabeledPath("final", f"{name} {what}", motion.final_path))
-        yield from self.hand.follow(motion.tail)
+    def _done(self, choice: Choice, leg: Leg) -> Iterator[np.ndarray]:
+        self.paths.append(LabeledPath("final", leg.name, choice.path))
+        self.hand.allow(())
+        yield from self.hand.go(choice)
 
-    def _planned(self, name: str, goal: Pose) -> Motion:
-        return plan_motion(self.hand.arm, self.hand.q, self._parts[name], goal, self.settings.motion)
+    def _leg(
+        self, name: str, k: int, goal: Pose, allowed: tuple[tuple[str, str], ...] = (), held: Pose | None = None
+    ) -> Leg:
+        """A motion with book k, which is in the hand where `held` (`tcp_from_object`) is given."""
+        hand, target = self.hand, self.task.objects[k]
+        body = hand.empty if held is None else hand.body_with(target.shape, held)
+        around = hand.surroundings.around(hand.observation, None if held is None else k)
+        return Leg(f"{name} {target.name}", self._parts[name], (goal,), body, around, allowed)
 
     def _held(self, k: int) -> Pose:
         """`tcp_from_object` as observed."""
