@@ -42,8 +42,8 @@ class Start(NamedTuple):
 class Simulation:
     """A scene being simulated: state in, physics, state out."""
 
-    def __init__(self, robot: str, things: Things, arms: tuple[str, ...] | None = None):
-        self.scene = compiled_scene(robot, things, arms)
+    def __init__(self, robot: str, things: Things, sides: tuple[str, ...] | None = None):
+        self.scene = compiled_scene(robot, things, sides)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         arms, data, model = self.scene.arms, self.data, self.model
