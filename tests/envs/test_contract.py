@@ -148,7 +148,7 @@ def test_a_twist_that_is_not_finite_is_refused():
 def test_actions_of_every_array_type_act_alike_and_compile_nothing(same, env):
     from onedemo.envs.state import command
 
-    outcomes, action = [], np.linspace(-0.5, 0.5, 8)
+    outcomes, action = [], np.linspace(-0.5, 0.5, *env.action_space.shape)
     for given in (action.astype(np.float32).astype(float), same(action.astype(np.float32).astype(float))):
         env.reset(seed=1)
         outcomes.append(env.step(given)[0]["joint_positions"])
