@@ -240,7 +240,8 @@ class BimanualPourEnv(OneDemoEnv):
     def _reachable(self, k: int, place: np.ndarray, yaw: float, seed: np.ndarray) -> np.ndarray | None:
         """Joints (dof,) of arm k that hold its glass at a place, or None."""
         arm = self.arms[k]
-        hand = level_hand(place + [0.0, 0.0, GRASP_HEIGHTS[k] - 0.5 * GLASSES[k].height], yaw)
+        rise = np.array([0.0, 0.0, GRASP_HEIGHTS[k] - 0.5 * GLASSES[k].height])
+        hand = level_hand(place + rise, yaw)
         q = inverse_kinematics(arm, hand, seed)
         if q is None or arm.margin(q) < MARGIN:
             return None

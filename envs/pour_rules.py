@@ -91,7 +91,8 @@ def allowed_contact(low, high, at_home):
     """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
 
     Wanted are the fingers on the source, those of a second arm on the target, the source on its stand as long as it
-    is there, and the target on its own. Beads may touch anything: where they end is judged by itself. A robot's contact with itself says nothing.
+    is there, and the target on its own. Beads may touch anything: where they end is judged by itself. A robot's
+    contact with itself says nothing.
     """
     if low == high or (low == ARM and high == FINGERS) or low == BEAD or high == BEAD:
         return True

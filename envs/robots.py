@@ -27,6 +27,8 @@ class Robot:
         beside: how far [m] the base stands beside the table's middle line when one of two arms works, so that this
             arm's shoulder is on it.
         reach: (nearest, farthest) [m] from the arm's first axis at which the hand can point straight down at the table.
+        gripper: robosuite's name of it; "default" for the robot's own. Robotiq's two-finger grippers, as robosuite
+            models them, fold up when they are closed on a block: what comes with them here holds a Panda's gripper.
         parked: per arm the joints [rad] at which it does nothing; only of robots with two.
     """
 
@@ -36,6 +38,7 @@ class Robot:
     stand: float | None = None
     beside: float = 0.0
     reach: tuple[float, float] = (0.32, 0.70)
+    gripper: str = "default"
     parked: dict[str, Joints] = field(default_factory=dict)
 
     def check_grip(self, width: float, name: str, thing: str) -> None:
@@ -93,18 +96,21 @@ ROBOTS = {
     ),
     "IIWA": Robot(
         (1.71, 1.71, 1.75, 2.27, 2.44, 3.14, 3.14),
-        (0.01, 0.12),
+        (0.002, 0.075),
         {"right": (0.0, 0.56, 0.0, -1.529, 0.0, 1.052, 0.0)},
+        gripper="PandaGripper",
     ),
     "UR5e": Robot(
         (3.14, 3.14, 3.14, 3.14, 3.14, 3.14),
-        (0.01, 0.08),
+        (0.002, 0.075),
         {"right": (-0.47, -1.735, 2.48, -2.275, -1.59, -1.991)},
+        gripper="PandaGripper",
     ),
     "Kinova3": Robot(
         (1.39, 1.39, 1.39, 1.39, 1.22, 1.22, 1.22),
-        (0.01, 0.08),
+        (0.002, 0.075),
         {"right": (-0.057, 0.722, 0.023, 1.312, -0.017, 1.108, -1.603)},
+        gripper="PandaGripper",
     ),
 }
 """By robosuite's names."""

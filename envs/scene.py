@@ -74,7 +74,7 @@ def compiled_scene(robot: str, things: Things = NOTHING, arms: tuple[str, ...] |
     """
     kind = robot_named(robot)
     working = kind.checked_arms(arms, robot)
-    env = _model_library().table_env(robot, things, kind.place(working))
+    env = _model_library().table_env(robot, kind.gripper, things, kind.place(working))
     model, rob = copy.copy(env.sim.model._model), env.robots[0]
     indices = {side: arm_index(model, rob, side, kind.speeds, robot) for side in rob.arms}
     idle = tuple(side for side in rob.arms if side not in working)

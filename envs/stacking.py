@@ -45,7 +45,7 @@ class StackEnv(OneDemoEnv):
     of its place, touched by no finger, standing still, the hand withdrawn by 5 cm, for half a second.
 
     ## Action Space
-    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
 
     | control mode | entry | meaning |
     |---|---|---|
@@ -79,7 +79,8 @@ class StackEnv(OneDemoEnv):
     ## Starting State
     By `level`: L0 the nominal row; L1 blocks moved by up to 10 cm and turned by up to 30 degrees, the base place by
     up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
-    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis.
+    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis (Baxter: 0.34 to 0.74 m):
+    where its hand can point straight down.
 
     L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way of the hand, L4 one that
     swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the forearm passes.
@@ -99,8 +100,8 @@ class StackEnv(OneDemoEnv):
     ## Arguments
     `robot="Panda"`, `n_blocks=3` (2 to 6), `level="L1"`, `obstacles=None` (what the level says) or `"none" |
     "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`, `arm=None` (the robot's usual one; Baxter has
-    "right" and "left", the other one is parked).
+    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`,
+    `arm=None` (the robot's usual one; Baxter has "right" and "left", of which the other is parked).
     `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `object_poses` (n, 7),
     `base_pose` (7,) of the lowest block's goal, and `joint_positions` (7,).
 

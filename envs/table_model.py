@@ -32,10 +32,11 @@ FRICTION = (1.0, 0.005, 0.0001)
 class OneDemoTableScene(ManipulationEnv):
     """Robot, table and things; used for its model only."""
 
-    def __init__(self, robot: str, things: Things, place: tuple[float | None, float]):
+    def __init__(self, robot: str, gripper: str, things: Things, place: tuple[float | None, float]):
         self.things, self.place = things, place
         super().__init__(
             robots=robot,
+            gripper_types=gripper,
             controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
             use_camera_obs=False,
             has_renderer=False,
@@ -96,7 +97,7 @@ def _wooden(block: Solid) -> BoxObject:
     )
 
 
-def table_env(robot: str, things: Things, place: tuple[float | None, float]) -> Any:
-    """A robosuite environment with the compiled model of the scene; `place`: see `Robot.place`."""
+def table_env(robot: str, gripper: str, things: Things, place: tuple[float | None, float]) -> Any:
+    """A robosuite environment with the compiled model of the scene; `gripper` and `place`: see `Robot`."""
     ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
-    return OneDemoTableScene(robot, things, place)
+    return OneDemoTableScene(robot, gripper, things, place)

@@ -6,6 +6,7 @@ the upper arms move: half of the shoulder's range would be a collision that the 
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -55,7 +56,7 @@ def slices(faces: np.ndarray, count: int) -> list[np.ndarray]:
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     heights = np.linspace(points[:, 2].min(), points[:, 2].max(), count + 1)
     found = []
-    for low, high in zip(heights[:-1], heights[1:], strict=True):
+    for low, high in pairwise(heights):
         inside = points[(points[:, 2] >= low) & (points[:, 2] <= high)]
         cloud = np.vstack([inside, *(_cut(edges, height) for height in (low, high))])
         found.append(cloud[hull_corners(cloud)])

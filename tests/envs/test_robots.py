@@ -1,4 +1,4 @@
-"""Every supported robot: it moves, it is where its kinematics say, its capsules hold it, its other arm is in the way."""
+"""Every supported robot: it moves, its kinematics are true, its capsules hold it, its other arm is in the way."""
 
 from __future__ import annotations
 
