@@ -80,7 +80,7 @@ class PourProgram:
     """The program of one episode; iterate over `actions()`."""
 
     SEGMENTS = ("carry",)
-    """What a demonstration of this task must have; "approach" too where the source is not in the hand from the start."""
+    """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.settings, self.hand = task, settings, hand
@@ -208,9 +208,7 @@ class PourProgram:
             raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
         return best
 
-    def _chosen_carry(
-        self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool
-    ) -> tuple[Way, float]:
+    def _chosen_carry(self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool) -> tuple[Way, float]:
         """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
 
         Args:
