@@ -80,7 +80,7 @@ class PourProgram:
     """The program of one episode; iterate over `actions()`."""
 
     SEGMENTS = ("carry",)
-    """What a demonstration of this task must have; "approach" too where the source is not in the hand from the start."""
+    """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.settings, self.hand = task, settings, hand

@@ -94,7 +94,7 @@ def allowed_contact(low, high, at_home):
     is there, and the target on its own. Beads may touch anything: where they end is judged by itself. A robot's
     contact with itself says nothing.
     """
-    if low == high or (low == ARM and high == FINGERS) or low == BEAD or high == BEAD:
+    if low in (high, BEAD) or high == BEAD or (low == ARM and high == FINGERS):
         return True
     if low == OTHER_ARM and high == OTHER_FINGERS:
         return True

@@ -39,7 +39,7 @@ TURNS = np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0))
 MARGIN = 0.1
 """Least distance of a joint to its limit [rad] where the source is in the hand from the start."""
 MAX_STARTS = 200
-VIEW = View((-0.12, -0.02, 1.0), 1.25, 150.0, -18.0)
+VIEW = View((-0.14, -0.02, 1.06), 1.42, 150.0, -17.0)
 
 
 class PourEnv(OneDemoEnv):
