@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from fnmatch import fnmatch
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +18,10 @@ from .console import check_writable, console, labeled, writing
 from .measuring import Row, row, seconds_per_call
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
 from .perf_planner import LINES
-
-SWAY_STEPS = 50
-"""Control steps in which the arm of the measured scene sways once."""
-
+from .perf_tasks import TASK_LINES, started
 
 TICK = "controller tick from Python / DQ_Robotics"
 KINEMATICS = "FK + Jacobian call / Pinocchio"
-STEP = "Stack step / raw mj_step"
-RESET = "Stack soft reset"
 PEER_STEP = "Stack step / robosuite's own step"
 MEMORY = "second environment in a process"
 IMPORT = "import onedemo.envs"
@@ -65,55 +59,8 @@ def _tick() -> Row:
     return row(TICK, mine / theirs, "ratio", 1 / 12, note)
 
 
-def _stack(**options: Any) -> Any:
-    """The environment, started from seed 0."""
-    import gymnasium as gym
-
-    from .. import envs  # noqa: F401  (registers the ids)
-
-    env: Any = gym.make("onedemo/Stack-v0", **options).unwrapped
-    env.reset(seed=0)
-    return env
-
-
-def _step() -> Row:
-    """Two scenes on the same way: one stepped as users do, one by MuJoCo alone under the controls of the first."""
-    import mujoco
-
-    env, bare = _stack(), _stack()
-    model, data, substeps = bare.sim.model, bare.sim.data, env.substeps
-    sway = np.sin(2.0 * np.pi * np.arange(SWAY_STEPS) / SWAY_STEPS)
-    actions, controls = 0.1 * sway[:, None] * np.append(np.ones(len(env.action_space.low) - 1), 0.0), []
-    for action in actions:
-        env.step(action)
-        controls.append(env.sim.data.ctrl.copy())
-    env.reset(seed=0)
-    ours, theirs = cycle(actions), cycle(controls)
-
-    def step() -> None:
-        env.step(next(ours))
-
-    def raw() -> None:
-        data.ctrl[:] = next(theirs)
-        mujoco.mj_step(model, data, substeps)
-
-    mine, physics = seconds_per_call(step, raw, together=True)
-    assert np.array_equal(env.sim.data.qpos, data.qpos), "the two scenes went different ways"
-    note = (
-        f"{mine * 1e3:.3f} ms against {physics * 1e3:.3f} ms for {substeps} substeps; two scenes with a swaying arm, "
-        "from the same start, under the same controls, to the same bits"
-    )
-    return row(STEP, mine / physics, "ratio", 1.15, note)
-
-
-def _reset() -> Row:
-    env = _stack()
-    (seconds,) = seconds_per_call(lambda: env.reset())
-    return row(RESET, seconds * 1e3, "ms", 3.0)
-
-
 def _peer_step() -> Row:
-    two, peer = _stack(n_blocks=2), _robosuite_stack()
+    two, peer = started("stack", n_blocks=2), _robosuite_stack()
     peer.reset()
     action, idle = np.zeros(two.action_space.shape), np.zeros(peer.action_dim)
     ours, theirs = seconds_per_call(lambda: two.step(action), lambda: peer.step(idle))
@@ -187,7 +134,7 @@ Lines = dict[str, Callable[[], Row]]
 GROUPS: dict[str, Lines] = {
     "controller": {TICK: _tick, KINEMATICS: _kinematics},
     "planner": LINES,
-    "step": {STEP: _step, RESET: _reset, PEER_STEP: _peer_step},
+    "step": {**TASK_LINES, PEER_STEP: _peer_step},
     "process": {MEMORY: _memory, IMPORT: _import, START: _start},
 }
 """Per group its lines: what is measured, and how."""
