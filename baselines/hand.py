@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class Hand:
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
         self.observation, self.surroundings = observation, surroundings
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
-        self._gripper, self.empty = OPEN, body
+        self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
         self._planner = ReactivePlanner(arm, body, settings)
 
     @property
@@ -60,6 +61,11 @@ class Hand:
     def goal_pose(self, index: int) -> Pose:
         """Where an object must end."""
         return Pose.from_vector(self.observation["goal_pose"][index])
+
+    def slow_down(self, pace: float) -> None:
+        """From now on use a share of the joints' speed limits; the hand must be empty, and on no path."""
+        self.arm = replace(self.arm, velocity_limits=pace * self._full)
+        self._planner = ReactivePlanner(self.arm, self.empty, self._planner.settings)
 
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
         """From now on object `index` is part of the arm, and no longer around it."""
@@ -133,8 +139,8 @@ class Hand:
         return self._planner.step(self.q)
 
     def _action(self, speeds: np.ndarray) -> np.ndarray:
-        normalized = np.clip(speeds / self.arm.velocity_limits, -1.0, 1.0)
-        self.q = self.q + self.settings.dt * normalized * self.arm.velocity_limits
+        normalized = np.clip(speeds / self._full, -1.0, 1.0)
+        self.q = self.q + self.settings.dt * normalized * self._full
         return np.append(normalized, self._gripper)
 
     def _stall_detail(self) -> str:

@@ -35,6 +35,8 @@ TURNS = np.deg2rad([0.0, *(sign * turn for turn in range(15, 91, 15) for sign in
 """Turns about a glass's axis [rad] that are tried, the demonstrated direction first."""
 MARGIN = 0.08
 """Distance of the joints to their limits [rad] in a roll-out with which a goal is good enough to look no further."""
+PACE = 0.5
+"""Share of the joints' speed limits that is used: a glass that is moved faster slips and lags behind what guards it."""
 NEAR = 0.02
 """Distance [m] to the target from which on the source comes close to it on purpose."""
 LIFT = 0.08
@@ -84,6 +86,7 @@ class PourProgram:
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.settings, self.hand = task, settings, hand
+        hand.slow_down(PACE)
         self.shown = {s.name: resampled(shown.segment_path(s.name), settings.resample) for s in shown.segments}
         self.in_hand = bool(hand.observation["motion_index"][0] >= 1.0)
         self.goals = PourGoals(task, shown, self._held() if self.in_hand else None)
