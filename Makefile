@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 FOLDERS := envs planner baselines configs bench tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lint types check perf soak study bodies clean
+.PHONY: help demo test slow lint types check perf soak study bodies beads clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -59,6 +59,9 @@ study: $(VENV)/.developed ## plan in a thousand random scenes, judged; and chang
 
 bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
 	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"
+
+beads: $(VENV)/.developed ## let the beads settle in their glasses anew (for a new glass)
+	@$(BIN)/python -c "from onedemo.envs import beads, pour_geometry as g; beads.TABLE.write_text(beads.table_text(((g.GLASSES[0], g.BEADS),)))"
 
 clean: ## remove the environment, the caches and the builds; runs/ stays
 	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

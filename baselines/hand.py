@@ -77,7 +77,7 @@ class Hand:
 
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
         """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
-        self.surroundings.allowed = tuple(contacts)
+        self.surroundings.allow(contacts)
 
     def choose(self, leg: Leg, then: Callable[[int], Leg] | None = None) -> Choice:
         """The best goal of a leg from here; see `choice.choose`."""

@@ -1,14 +1,14 @@
 """Pouring from ONE demonstration: fetch the source, lift it, carry and tilt it as shown, seen from the target.
 
-Only the goals are new. The end of the carry is where the demonstrated lip was, seen from the demonstrated rim, so
-that glasses of other sizes, held at other heights, need no other demonstration. A round glass looks the same from
-everywhere: each turn about its axis gives another goal, and the one next to the demonstrated that can be done is
-taken. The lift is a motion relative to where the source stands, which imitation anchored at the target would forget.
+Only the goals are new, see `pour_goals`. Of the turns of a round glass the one next to the demonstrated is taken that
+can be done beside everything around. The lift is a motion relative to where the source stands, which imitation
+anchored at the target would forget.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,15 +16,17 @@ import numpy as np
 from ..envs.pour_geometry import SOURCE, TARGET
 from ..envs.rooms import tool_room
 from ..envs.task import TaskDescription
+from ..planner.body import Body
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
-from ..planner.motions import Motion, plan_motion
+from ..planner.planning import Planner
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.shapes import Obstacle, pack
 from ..planner.tsia import departure, imitated_path, screw_path
 from .hand import CLOSE, Hand
 from .policy import LabeledPath
+from .pour_goals import PourGoals
 
 if TYPE_CHECKING:
     from .screw_policy import ScrewSettings
@@ -39,82 +41,46 @@ LIFT = 0.08
 """Height [m] of a lift straight up, where none is shown."""
 LOST = 0.03
 """Distance [m] of the source from where it should be in the hand beyond which it was dropped."""
+CHANCES = 3
+"""How often another way is looked for where the carry is blocked."""
 
 
-class Size(NamedTuple):
-    """Of a round glass, outside [m]."""
-
-    radius: float
-    height: float
-
-    @staticmethod
-    def of(extents: np.ndarray) -> Size:
-        """Of full extents (3,) along its own axes."""
-        return Size(0.5 * float(extents[0]), float(extents[2]))
+Contacts = tuple[tuple[str, str], ...]
 
 
-def standing(pose: Pose) -> Pose:
-    """The frame of a round glass that stands: its turn about the vertical says nothing."""
-    return Pose.from_position_quaternion(pose.position)
+class Way(NamedTuple):
+    """Motions as planned, one after the other.
 
-
-def turned_like(held: Pose, shown: Pose) -> Pose:
-    """A round glass in the hand, turned about its own axis to be as near as possible to how another is held."""
-    return held @ Pose.from_yaw([0, 0, 0], (held.inverse() @ shown).yaw)
-
-
-def lip_direction(glass: Pose) -> np.ndarray:
-    """(2,) direction, in the frame of a tilted glass, of the lowest point of its rim."""
-    down = -glass.rotation[2, :2]
-    return down / np.linalg.norm(down)
-
-
-def lip(size: Size, direction: np.ndarray) -> Pose:
-    """`glass_from_lip`."""
-    return Pose.from_position_quaternion([*(size.radius * direction), 0.5 * size.height])
-
-
-class PourGoals:
-    """Where the hand must end, for glasses anywhere, from where it ended in the demonstration.
-
-    Args:
-        task: with the sizes of the glasses.
-        shown: the demonstration: "carry" ends relative to the target, "approach", if there, relative to the source.
-        held: `tcp_from_source` that is taken for the demonstrated one where no "approach" is shown.
+    Attributes:
+        paths: to follow.
+        q: (dof,) joints at the end.
+        margin: smallest joint margin on the way [rad].
+        rank: 2 as shown, 1 round something or through joint space, 0 does not arrive.
+        reason: "" or why it does not arrive.
     """
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, held: Pose | None):
-        self._sizes = [Size.of(each.size) for each in task.objects]
-        names = [segment.name for segment in shown.segments]
-        if "approach" in names:
-            source = standing(shown.segment("approach").reference_pose)
-            self._hand = source.inverse() @ shown.segment_path("approach")[-1]
-            held = self._hand.inverse()
-        if held is None:
-            raise PlanFailed("plan_failed", "the demonstration shows no approach, and the source is not in the hand")
-        self.held, sizes = held, [Size.of(shown.object_sizes[each.name]) for each in task.objects]
-        end = shown.segment_path("carry")[-1] @ held
-        self._direction = lip_direction(end)
-        rim = _rim(shown.segment("carry").reference_pose, sizes[TARGET])
-        self._rim_from_lip = rim.inverse() @ end @ lip(sizes[SOURCE], self._direction)
+    paths: tuple[PosePath, ...]
+    q: np.ndarray
+    margin: float
+    rank: int
+    reason: str = ""
 
-    def grasp(self, source: Pose, turn: float) -> Pose:
-        """The tcp at a standing source."""
-        return Pose.from_yaw(source.position, turn) @ self._hand
+    def then(self, other: Way) -> Way:
+        """Both, one after the other."""
+        margin, rank = min(self.margin, other.margin), min(self.rank, other.rank)
+        return Way((*self.paths, *other.paths), other.q, margin, rank, self.reason or other.reason)
 
-    def pouring(self, target: Pose, held: Pose, turn: float) -> Pose:
-        """The tcp at the end of the carry, for a source held as `tcp_from_source`."""
-        tcp_from_lip = turned_like(held, self.held) @ lip(self._sizes[SOURCE], self._direction)
-        rim = _rim(target, self._sizes[TARGET]) @ Pose.from_yaw([0, 0, 0], turn)
-        return rim @ self._rim_from_lip @ tcp_from_lip.inverse()
-
-
-def _rim(target: Pose, size: Size) -> Pose:
-    return standing(target) @ Pose.from_position_quaternion([0.0, 0.0, 0.5 * size.height])
+    @property
+    def order(self) -> tuple[int, bool, float]:
+        """What is better."""
+        return self.rank, self.margin >= MARGIN, self.margin
 
 
 class PourProgram:
     """The program of one episode; iterate over `actions()`."""
+
+    SEGMENTS = ("carry",)
+    """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.settings, self.hand = task, settings, hand
@@ -122,35 +88,44 @@ class PourProgram:
         self.in_hand = bool(hand.observation["motion_index"][0] >= 1.0)
         self.goals = PourGoals(task, shown, self._held() if self.in_hand else None)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.shown.items()]
+        self.source, self.target = (each.name for each in task.objects)
+        self._plan = settings.reactive.plan
+        self._standing: Contacts = (("held", task.furniture[SOURCE].name),)
+        self._wanted: tuple[Contacts, Contacts] = (
+            (("fingers", self.source), ("hand", self.source)),
+            (("held", self.target),),
+        )
 
     def actions(self) -> Iterator[np.ndarray]:
         """Fetch the source if it is not in the hand, lift it, pour, and turn it upright again."""
-        hand, names = self.hand, [each.name for each in self.task.objects]
+        hand = self.hand
         if self.in_hand:
             yield from hand.grip(CLOSE, self.settings.close)
         else:
-            yield from self._fetch(names[SOURCE])
-        grasped = self._held()
-        hand.hold(SOURCE, self.task.objects[SOURCE].shape, grasped)
-        hand.allow([("held", each.name) for each in self.task.furniture[:1]])
+            yield from self._fetch()
+        grasped, shape = self._held(), self.task.objects[SOURCE].shape
+        hand.hold(SOURCE, shape, grasped)
+        hand.allow(self._standing)
         yield from hand.follow(self._lift(hand.arm.fk(hand.q)), loosely=True)
-        hand.allow(())
         # the source slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held()
         if held.gap(grasped)[0] > LOST:
-            raise PlanFailed("dropped", f"{names[SOURCE]} is not in the hand after the lift")
-        hand.hold(SOURCE, self.task.objects[SOURCE].shape, held)
-        yield from self._pour(self._chosen_carry(hand.q, held), held, names[TARGET])
+            raise PlanFailed("dropped", f"{self.source} is not in the hand after the lift")
+        hand.hold(SOURCE, shape, held)
+        yield from self._carry(held)
+        yield from hand.wait(self.settings.drain)
+        yield from self._return()
 
     def _held(self) -> Pose:
         """`tcp_from_source` as observed."""
         return self.hand.measured_tcp.inverse() @ self.hand.object_pose(SOURCE)
 
-    def _fetch(self, name: str) -> Iterator[np.ndarray]:
-        self.hand.allow([("fingers", name), ("hand", name)])
-        motion = self._chosen_fetch()
-        self.paths.append(LabeledPath("final", f"fetch {name}", motion.final_path))
-        yield from self.hand.follow(motion.tail)
+    def _fetch(self) -> Iterator[np.ndarray]:
+        before, after, *_ = self._chosen_fetch().paths
+        self.paths.append(LabeledPath("final", f"fetch {self.source}", before.joined(after)))
+        yield from self.hand.follow(before, loosely=True)
+        self.hand.allow(self._wanted[SOURCE])
+        yield from self.hand.follow(after)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(CLOSE, self.settings.close)
 
@@ -161,62 +136,112 @@ class PourProgram:
         up = Pose.from_position_quaternion([0.0, 0.0, LIFT]) @ start
         return screw_path(start, up, self.settings.resample)
 
-    def _pour(self, motion: Motion, held: Pose, target: str) -> Iterator[np.ndarray]:
-        """Carry, then tilt: near the target, the source may come as near to it as was shown."""
-        self.paths.append(LabeledPath("final", "carry and pour", motion.final_path))
-        split = self._close_from(motion.tail, held)
-        yield from self.hand.follow(motion.tail[: split + 1], loosely=True)
-        self.hand.allow([("held", target)])
-        yield from self.hand.follow(motion.tail[split:])
-        yield from self.hand.wait(self.settings.drain)
-        back = imitated_path(self.shown["return"], self._upright(motion)) if "return" in self.shown else None
-        yield from self.hand.follow(motion.tail[split:].reversed() if back is None else back, loosely=True)
+    def _carry(self, held: Pose) -> Iterator[np.ndarray]:
+        """Carry, then tilt; another way is looked for where one turns out to be blocked."""
+        failed: list[float] = []
+        while True:
+            way, turn = self._chosen_carry(self.hand.q, held, failed, thoroughly=True)
+            carry, tilt = way.paths
+            self.paths.append(LabeledPath("final", "carry and pour", carry.joined(tilt)))
+            self.hand.allow(())
+            try:
+                yield from self.hand.follow(carry, loosely=True)
+                # near the target, the source may come as near to it as was shown
+                self.hand.allow(self._wanted[TARGET])
+                yield from self.hand.follow(tilt)
+                return
+            except PlanFailed:
+                failed.append(turn)
+                if len(failed) == CHANCES:
+                    raise
 
-    def _upright(self, motion: Motion) -> Pose:
-        """Where the shown return ends, done from the end of the motion."""
-        back = self.shown["return"]
-        return motion.tail[-1] @ back[0].inverse() @ back[-1]
+    def _return(self) -> Iterator[np.ndarray]:
+        """Upright again, as shown if it is shown."""
+        if "return" in self.shown:
+            back = self.shown["return"]
+            here = self.hand.arm.fk(self.hand.q)
+            yield from self.hand.follow(imitated_path(back, here @ back[0].inverse() @ back[-1]), loosely=True)
 
-    def _close_from(self, path: PosePath, held: Pose) -> int:
-        """Index of the pose from which on the source stays near the target."""
-        body = self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.hand.arm)
-        tool, shape = body.tool(self.hand.arm), self.task.objects[TARGET].shape
-        target = pack([Obstacle(shape, self.hand.object_pose(TARGET))])
-        rooms = np.array([tool_room(tool, row[None], target) for row in path.dqs])
+    def _body(self, held: Pose) -> Body:
+        return self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.hand.arm)
+
+    def _around(self, body: Body) -> list[Obstacle]:
+        """What stands around an arm; what moves is left to the moment."""
+        seen = self.hand.surroundings.seen(self.hand.observation)
+        still = [each for each in seen if not np.any(each.velocity)]
+        return [each for each in still if not (body.held and each.name == self.source)]
+
+    def _near(self, index: int, path: PosePath, body: Body) -> int:
+        """Index of the pose from which on the hand, or what it holds, stays near a glass."""
+        glass = pack([Obstacle(self.task.objects[index].shape, self.hand.object_pose(index))])
+        tool = body.tool(self.hand.arm)
+        rooms = np.array([tool_room(tool, row[None], glass) for row in path.dqs])
         far = np.flatnonzero(rooms > NEAR)
-        return int(far[-1]) if len(far) else 0
+        return max(1, int(far[-1])) if len(far) else 1
 
-    def _chosen_fetch(self) -> Motion:
+    def _planned(self, planner: Planner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
+        """A motion to the end of a path, round what is around."""
+        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=allowed)
+        followed = path if plan.how == "joint search" or not plan.success else plan.path
+        rank = 0 if not plan.success else 2 if plan.how == "direct" else 1
+        reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"
+        return Way((followed,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason)
+
+    def _chosen_fetch(self) -> Way:
         """The grasp, and with it the pouring, that is nearest to what was shown and can be done."""
-        hand, best = self.hand, None
+        hand, best, held = self.hand, None, self.goals.held
+        empty = Planner(hand.arm, self.task.bodies[0], self._plan)
+        full = Planner(hand.arm, self._body(held), replace(self._plan, search=None))
         for turn in TURNS:
             goal = self.goals.grasp(hand.object_pose(SOURCE), turn)
-            fetch = plan_motion(hand.arm, hand.q, self.shown["approach"], goal, self.settings.motion)
-            if not fetch.arrives:
-                best = best or (-np.inf, fetch)
-                continue
-            lift = self._lift(goal)
-            raised = plan_motion(hand.arm, fetch.q, lift, lift[-1], self.settings.motion)
-            carry = self._chosen_carry(raised.q, self.goals.held)
-            margin = min(fetch.margin, raised.margin, carry.margin) if raised.arrives and carry.arrives else -1.0
-            if best is None or margin > best[0]:
-                best = (margin, fetch)
-            if margin >= MARGIN:
+            way = self._in_two(empty, imitated_path(self.shown["approach"], goal), hand.q, SOURCE)
+            if way.rank:
+                way = way.then(self._planned(full, self._lift(goal), way.q, self._standing))
+            if way.rank:
+                way = way.then(self._chosen_carry(way.q, held, [], thoroughly=False)[0])
+            if best is None or (len(way.paths), way.order) > (len(best.paths), best.order):
+                best = way
+            if best.rank and best.margin >= MARGIN:
                 break
         assert best is not None
-        if not best[1].arrives:
-            raise PlanFailed(best[1].reason, "no turn of the source can be grasped as demonstrated")
-        return best[1]
-
-    def _chosen_carry(self, q: np.ndarray, held: Pose) -> Motion:
-        """The pouring direction that is nearest to what was shown and can be done from joints q."""
-        hand, best = self.hand, None
-        for turn in TURNS:
-            goal = self.goals.pouring(hand.object_pose(TARGET), held, turn)
-            motion = plan_motion(hand.arm, q, self.shown["carry"], goal, self.settings.motion)
-            if best is None or (motion.arrives, motion.margin) > (best.arrives, best.margin):
-                best = motion
-            if best.arrives and best.margin >= MARGIN:
-                break
-        assert best is not None
+        if len(best.paths) == 2 and not best.rank:
+            raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
         return best
+
+    def _chosen_carry(self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool) -> tuple[Way, float]:
+        """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
+
+        Args:
+            q: (dof,) joints at the start.
+            held: `tcp_from_source`.
+            failed: turns that were tried in vain.
+            thoroughly: also look for ways through joint space.
+        """
+        body = self._body(held)
+        quick = Planner(self.hand.arm, body, replace(self._plan, search=None))
+        tries = []
+        for turn in TURNS:
+            if turn not in failed:
+                tries.append((self._carried(quick, q, held, turn), turn))
+                if tries[-1][0].rank == 2 and tries[-1][0].margin >= MARGIN:
+                    return tries[-1]
+        best = max(tries, key=lambda each: each[0].order)
+        if best[0].rank == 0 and thoroughly:
+            thorough = Planner(self.hand.arm, body, self._plan)
+            tries = [(self._carried(thorough, q, held, turn), turn) for _, turn in tries[:CHANCES]]
+            best = max(tries, key=lambda each: each[0].order)
+        return best
+
+    def _carried(self, planner: Planner, q: np.ndarray, held: Pose, turn: float) -> Way:
+        """The carry and the tilting of one turn."""
+        goal = self.goals.pouring(self.hand.object_pose(TARGET), held, turn)
+        return self._in_two(planner, imitated_path(self.shown["carry"], goal), q, TARGET)
+
+    def _in_two(self, planner: Planner, path: PosePath, q: np.ndarray, glass: int) -> Way:
+        """A path that ends near a glass, which may be touched only by what comes near it on purpose."""
+        split = self._near(glass, path, planner.body)
+        before, after = path[: split + 1], path[split:]
+        way = self._planned(planner, before, q, ())
+        if way.rank == 0:
+            return way._replace(paths=(before, after))
+        return way.then(self._planned(planner, after, way.q, self._wanted[glass]))

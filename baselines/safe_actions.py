@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from ..planner.body_models import resting_pairs
 from ..planner.errors import BadOption
 from ..planner.robot_work import PREVIOUS
 from ..planner.safety import SafetyLayer, SafetySettings
 from .policy import Observation
 from .surroundings import Surroundings
+from .two_hands import pairs_of
 
 MARGIN = 0.005
 """Distance [m] to keep from the table and from objects: more than the arm lags, less than a grasp needs."""
@@ -44,7 +43,7 @@ class SafeActions(gym.Wrapper):
         if getattr(inner, "control_mode", None) != "joint_velocity":
             raise BadOption("control_mode", "the safety layer needs joint_velocity")
         self.settings, self._task = settings or SAFE, inner.task
-        self._pairs = _pairs_of(self._task.arms, self._task.bodies)
+        self._pairs = pairs_of(self._task.arms, self._task.bodies)
         self._surroundings = Surroundings(self._task, table_margin=MARGIN, margin=MARGIN)
         self._q = np.zeros((len(self._task.arms), self._task.arms[0].dof))
         self._key: tuple[Any, ...] = ()
@@ -82,7 +81,7 @@ class SafeActions(gym.Wrapper):
         if self._layer is None or self._key[0] is not obstacles or self._key[1] != near:
             self._key = (obstacles, near)
             task = self._task
-            allowed = [("fingers", name) for name in near]
+            allowed = [*task.touching, *(("fingers", name) for name in near)]
             before, self._layer = self._layer, SafetyLayer(
                 task.arms, task.bodies, obstacles, task.control_dt,
                 settings=self.settings, allowed=allowed, pairs=self._pairs,
@@ -95,17 +94,3 @@ class SafeActions(gym.Wrapper):
         centers = self._observation["object_pose"][:, :3]
         reach = np.linalg.norm(centers[:, None] - self._observation["tcp_pose"][None, :, :3], axis=2).min(axis=1)
         return [each.name for each, way in zip(self._task.objects, reach, strict=True) if way < WITHIN_REACH]
-
-
-def _pairs_of(arms: Sequence[Any], bodies: Sequence[Any]) -> list[tuple[int, int]]:
-    """Capsules, counted through all bodies, that may hit each other: of one arm those apart, of two arms all."""
-    pairs, first = [], 0
-    starts = np.concatenate([[0], np.cumsum([len(body) for body in bodies])])
-    for arm, body in zip(arms, bodies, strict=True):
-        resting = {tuple(sorted(pair)) for pair in resting_pairs(arm, body)}
-        own = [(i, j) for i in range(len(body)) for j in range(i + 1, len(body)) if (i, j) not in resting]
-        pairs += [(first + i, first + j) for i, j in own]
-        first += len(body)
-    if len(bodies) == 2:
-        pairs += [(i, j) for i in range(starts[1]) for j in range(int(starts[1]), int(starts[2]))]
-    return pairs

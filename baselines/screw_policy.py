@@ -15,12 +15,14 @@ from ..planner.motions import MotionSettings
 from ..planner.plans import PlanSettings
 from ..planner.repet import RepetSettings
 from ..planner.safety import SafetySettings
+from .bimanual_program import BimanualPourProgram
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
 from .pour_program import PourProgram
 from .shelve_program import ShelveProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
+from .two_hands import TwoHands
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +70,19 @@ class ScrewSettings:
         return ReactiveSettings(plan=plan, patience=self.motion.pursuit.patience)
 
 
-Program = StackProgram | PourProgram | ShelveProgram
-PROGRAMS = {"stack": StackProgram, "pour": PourProgram, "shelve": ShelveProgram}
+Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram
+PROGRAMS = {
+    "stack": StackProgram,
+    "pour": PourProgram,
+    "shelve": ShelveProgram,
+    "bimanual_pour": BimanualPourProgram,
+}
 
 
 class Episode:
     """What the policy remembers of an episode: the hand, the running program and how it ended."""
 
-    def __init__(self, hand: Hand, program: Program):
+    def __init__(self, hand: Hand | TwoHands, program: Program):
         self.hand, self.program = hand, program
         self.actions: Iterator[np.ndarray] | None = program.actions()
         self.ended = PolicyReport()
@@ -97,9 +104,12 @@ class ScrewPolicy(EpisodePolicy):
 
     def begin(self, observation: Observation) -> Episode:
         """A new episode; nothing is planned yet."""
-        around = Surroundings(self.task)
-        hand = Hand(self.task.arms[0], self.task.bodies[0], self.settings.reactive, around, observation)
-        return Episode(hand, PROGRAMS[self.task.name](self.task, self.demonstration, self.settings, hand))
+        task, settings = self.task, self.settings
+        if len(task.arms) == 2:
+            hands = TwoHands(task, settings.motion, settings.safety, observation)
+            return Episode(hands, BimanualPourProgram(task, self.demonstration, settings, hands))
+        hand = Hand(task.arms[0], task.bodies[0], settings.reactive, Surroundings(task), observation)
+        return Episode(hand, PROGRAMS[task.name](task, self.demonstration, settings, hand))
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:
         """The next action of the program; standing still once it has ended or given up."""

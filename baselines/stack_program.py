@@ -138,6 +138,10 @@ class StackProgram:
         hand, target = self.hand, self.task.objects[k]
         body = hand.empty if held is None else hand.body_with(target.shape, held)
         around = hand.surroundings.around(hand.observation, None if held is None else k)
-        wanted = [pair for pair in self._wanted(k) if pair[1] in [obstacle.name for obstacle in around]]
+        wanted = [
+            pair
+            for pair in (*self.task.touching, *self._wanted(k))
+            if pair[1] in [obstacle.name for obstacle in around]
+        ]
         allowed = tuple(pair for pair in wanted if pair[0] in body.names)
         return Leg(target.name, demonstrated, goals, body, around, allowed, leaving)

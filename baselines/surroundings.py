@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,13 +33,17 @@ class Surroundings:
     """
 
     def __init__(self, task: TaskDescription, *, table_margin: float = TABLE_MARGIN, margin: float = OBJECT_MARGIN):
-        self.allowed: tuple[tuple[str, str], ...] = ()
+        self.allowed: tuple[tuple[str, str], ...] = task.touching
         self._task, self._held, self._margin = task, None, margin
         self._fixed = tuple(replace(f, margin=table_margin) if f.name == TABLE else f for f in task.fixtures)
         self._poses = np.full((len(task.objects) + len(task.furniture), 7), np.inf)
         self._intruders = np.zeros((task.obstacles, 15))
         self._things: tuple[Obstacle, ...] = ()
         self._seen: tuple[Obstacle, ...] = ()
+
+    def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
+        """The contacts that are wanted from now on, besides those that nobody needs to look at."""
+        self.allowed = (*self._task.touching, *contacts)
 
     def without(self, index: int | None) -> None:
         """From now on an object is in the hand, or none is."""

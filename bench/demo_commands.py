@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..planner.errors import UnknownName
 from .console import check_writable, console, labeled, writing
 
 if TYPE_CHECKING:
     from ..planner.demo import Demonstration, Segment
 
+IMPORTED = ("", "pour")
+"""Tasks that a recording of poses may be made a demonstration of; "" for none."""
 app = typer.Typer(
     help="Look at a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="markdown"
 )
@@ -63,6 +66,7 @@ def import_(
     units: Annotated[str, typer.Option(help="Poses only: m, cm or mm.")] = "m",
     quaternion: Annotated[str, typer.Option(help="Poses only: order of the columns, wxyz or xyzw.")] = "wxyz",
     rate: Annotated[float, typer.Option(help="Poses only: samples per second.")] = 0.0,
+    task: Annotated[str, typer.Option(help="Poses only: pour, for a glass in the hand from start to end.")] = "",
 ) -> None:
     """Make a demonstration from a recording.
 
@@ -74,11 +78,15 @@ def import_(
     - onedemo demo import panda_teleop_stack.npz -o stack.npz --licence "MIT, see LICENSE-robosuite.txt"
 
     - onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100
+
+    - onedemo demo import panda_pouring.npy -o pour_real.npz --units cm --rate 100 --task pour
     """
     from ..planner.demo_io import save_demonstration
     from ..planner.recordings import from_pose_table, stack_from_teleoperation
 
     check_writable("--output", output)
+    if task not in IMPORTED:
+        raise UnknownName("task of a pose recording", task, IMPORTED)
     title = name or output.stem
     if raw.suffix == ".npz":
         from ..envs.scene import robot_arm
@@ -95,9 +103,52 @@ def import_(
             source=source,
             licence=licence,
         )
+        if task == "pour":
+            demo = _with_glasses(demo)
     with writing("--output", output):
         save_demonstration(demo, output)
     console().print(f"wrote {output}: {len(demo.path)} samples, {len(demo.segments)} segments")
+
+
+def _with_glasses(demo: Demonstration) -> Demonstration:
+    """A recording of pouring with the glasses that were not recorded; says where they stand."""
+    from ..baselines.pour_recording import pour_from_poses
+
+    placed = pour_from_poses(demo)
+    for glass, top in zip(("source", "target"), placed.stands, strict=True):
+        console().print(f"the {glass} is taken to stand at {' '.join(f'{value:.3f}' for value in top)} m")
+    return placed.demonstration
+
+
+@app.command()
+def record(
+    task: Annotated[str, typer.Argument(help="The task to show, like pour.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The demonstration to write (.npz).")],
+) -> None:
+    """Record the scripted demonstration of a task on the simulated robot.
+
+    A script moves the arm along waypoints (baselines/record_*.py) under physics; what is recorded is what the joint
+    encoders measure. A demonstration that does not succeed is not written.
+
+    Example: onedemo demo record pour --output pour.npz
+    """
+    import gymnasium as gym
+
+    from .. import envs  # noqa: F401  (registers the ids)
+    from ..baselines.recorders import RECORDERS
+    from ..planner.demo_io import save_demonstration
+    from .tasks import TASKS
+
+    check_writable("--output", output)
+    if task not in RECORDERS:
+        raise UnknownName("scripted demonstration", task, RECORDERS)
+    env = gym.make(TASKS[task].id, level="L0")
+    with console(stderr=True).status("moving the arm"):
+        demo = RECORDERS[task](env.unwrapped)
+    env.close()
+    with writing("--output", output):
+        save_demonstration(demo, output)
+    console().print(f"wrote {output}: {demo.duration:.1f} s, {len(demo.path)} samples, {len(demo.segments)} segments")
 
 
 def demonstration_path(name: str) -> Path:

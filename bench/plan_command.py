@@ -171,7 +171,8 @@ def _robot(scene: Scene) -> tuple[Arm, Body, np.ndarray]:
     if isinstance(robot, UrdfRobot):
         return _urdf_robot(scene, robot)
     from ..envs.bodies import robot_body
-    from ..envs.scene import ROBOTS, compiled_scene
+    from ..envs.robots import ROBOTS
+    from ..envs.scene import compiled_scene
 
     if robot not in ROBOTS:
         with scene.blaming("robot"):

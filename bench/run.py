@@ -110,17 +110,17 @@ def prepared(config: RunConfig, source: Path, overrides: list[str]) -> tuple[Any
     """
     from ..baselines.factory import make_policy
     from ..baselines.screw_policy import PROGRAMS
-    from ..planner import motions, reactive
+    from ..planner import reactive
     from ..planner.demo_io import load_demonstration
 
     _check_names(config, source, overrides)
     file = demonstration_path(config.demonstration)
     demonstration = load_demonstration(file)
-    _check_demonstration(demonstration, file, config.task, PROGRAMS[config.task].SEGMENTS)
+    shown = TASKS[config.task].shown or config.task
+    _check_demonstration(demonstration, file, shown, PROGRAMS[config.task].SEGMENTS)
     env: Any = _made(config, source)
     task = env.unwrapped.task
     for arm, body in zip(task.arms, task.bodies, strict=True):
-        motions.warm_up(arm)
         reactive.warm_up(arm, body)
     return env, make_policy(config.method, task, demonstration, config.settings)
 
@@ -162,7 +162,7 @@ def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
     """Refuse unknown names, and say where they were written."""
     from ..baselines.factory import POLICIES
     from ..envs.levels import LEVELS, OBSTACLES
-    from ..envs.scene import ROBOTS
+    from ..envs.robots import ROBOTS
 
     changed = {text.partition("=")[0] for text in overrides}
     names = {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}

@@ -29,13 +29,19 @@ class TaskFacts:
     Attributes:
         id: Gymnasium's.
         error: see `Error`.
+        shown: the task that its demonstration shows, where that is another one; "" for itself.
     """
 
     id: str
     error: Error
+    shown: str = ""
 
 
 TASKS = {
     "stack": TaskFacts("onedemo/Stack-v0", Error("position_error", "largest position error", "mm", 1e3)),
+    "pour": TaskFacts("onedemo/Pour-v0", Error("fraction_outside", "largest share of beads outside", "%", 1e2)),
     "shelve": TaskFacts("onedemo/Shelve-v0", Error("position_error", "largest position error", "mm", 1e3)),
+    "bimanual_pour": TaskFacts(
+        "onedemo/BimanualPour-v0", Error("fraction_outside", "largest share of beads outside", "%", 1e2), "pour"
+    ),
 }

@@ -64,6 +64,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         reward: str,
         render_mode: str | None,
         control_frequency: int,
+        arms: tuple[str, ...] | None = None,
         view: View = TABLE_VIEW,
     ):
         level_named(level)
@@ -74,7 +75,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             checked_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         self.render_mode = render_mode
         self.substeps = _substeps(control_frequency)
-        self.sim = Simulation(robot, replace(things, obstacles=SLOTS))
+        self.sim = Simulation(robot, replace(things, obstacles=SLOTS), arms)
         self.arms = tuple(index.arm for index in self.sim.scene.arms)
         self.metadata = {**METADATA, "render_fps": control_frequency}
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6

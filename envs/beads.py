@@ -80,7 +80,8 @@ def _heap(glass: Glass, beads: Beads) -> np.ndarray:
     layer, spot = np.divmod(np.arange(beads.count), len(ring))
     height = glass.wall - 0.5 * glass.height + 1.1 * beads.radius + pitch * layer
     # exactly above each other they would balance
-    askew = 0.02 * beads.radius * np.random.default_rng(0).uniform(-1.0, 1.0, (beads.count, 2))
+    rng = np.random.default_rng(0)
+    askew = 0.02 * beads.radius * rng.uniform(-1.0, 1.0, (beads.count, 2))
     return np.column_stack([ring[spot] + askew, height])
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..planner.body import Body
+from ..planner.body import FRAME, Body
 from ..planner.body_models import body_from_mujoco
 from ..planner.errors import UnknownName
+from .robots import robot_named
 from .scene import compiled_scene
 
 TABLE = Path(__file__).parent / "assets" / "bodies.json"
@@ -19,10 +20,14 @@ DIGITS = 5
 
 
 def fitted_bodies(robot: str) -> tuple[Body, ...]:
-    """The bodies of a robot's arms, fitted to its collision geometry; takes some seconds per arm."""
-    scene = compiled_scene(robot)
+    """The bodies of all arms of a robot, fitted to its collision geometry; takes some seconds per arm.
+
+    The trunk that two arms share is no part of them: it is among the scene's fixtures.
+    """
+    sides = tuple(robot_named(robot).ready)
+    scene = compiled_scene(robot, arms=sides)
     bodies = [body_from_mujoco(scene.model, index.arm, index.arm.joint_names) for index in scene.arms]
-    return tuple(_rounded(body) for body in bodies)
+    return tuple(_rounded(body if len(sides) == 1 else _moving(body)) for body in bodies)
 
 
 @cache
@@ -46,6 +51,12 @@ def table_text(robots: tuple[str, ...]) -> str:
         for robot in robots
     }
     return json.dumps(table, indent=1) + "\n"
+
+
+def _moving(body: Body) -> Body:
+    """A body without what does not move."""
+    keep = np.flatnonzero(body.rows[:, FRAME] >= 0)
+    return Body(body.rows[keep], tuple(body.names[k] for k in keep))
 
 
 def _rounded(body: Body) -> Body:

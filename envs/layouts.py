@@ -14,8 +14,8 @@ SPACING, ROW_X = 0.22, (-0.08, -0.22)
 """Distance of blocks in a row and x of the first and second row [m]; three blocks fill a row."""
 BLOCK_GAP, BASE_GAP = 0.12, 0.17
 """Least distance of block centers to each other and to the base place [m]."""
-NEAREST, FARTHEST = 0.32, 0.70
-"""Distance of blocks from the arm's base axis [m]: what an arm reaches with a level hand."""
+REACH = (0.32, 0.70)
+"""Distance of blocks from the arm's base axis [m]: what a Panda reaches with a level hand."""
 TABLE_EDGE = 0.36
 """Largest |x| and |y| of a block's center on the table [m]."""
 LONG_GAP = 0.30
@@ -76,6 +76,7 @@ def stack_layout(
     arm_axis: np.ndarray,
     joints: tuple[int, ...],
     base_gap: float = BASE_GAP,
+    reach: tuple[float, float] = REACH,
 ) -> Layout:
     """A layout of blocks and base place by rejection: independent of any method.
 
@@ -86,6 +87,7 @@ def stack_layout(
         arm_axis: (2,) x, y of the arm's base axis [m].
         joints: shape (n_arms, dof) of the start joints.
         base_gap: least distance of the blocks to the base place [m].
+        reach: least and largest distance of the blocks from the arm's axis [m].
 
     Raises:
         BadOption: no layout was found in a bounded number of tries.
@@ -95,20 +97,26 @@ def stack_layout(
     for _ in range(MAX_TRIES):
         places = nominal + rng.uniform(-ranges.block, ranges.block, (count, 2))
         base = np.array(BASE_PLACE) + rng.uniform(-ranges.base, ranges.base, 2)
-        if fits(places, base, arm_axis, base_gap):
+        if fits(places, base, arm_axis, base_gap, reach):
             yaws = rng.uniform(-ranges.yaw, ranges.yaw, count + 1)
             blocks = np.column_stack([places, yaws[:count]])
             return Layout(blocks, np.append(base, yaws[count]), offsets)
     raise BadOption("n_blocks", f"{count} blocks do not fit on the table at this level")
 
 
-def fits(places: np.ndarray, base: np.ndarray, arm_axis: np.ndarray, base_gap: float = BASE_GAP) -> bool:
+def fits(
+    places: np.ndarray,
+    base: np.ndarray,
+    arm_axis: np.ndarray,
+    base_gap: float = BASE_GAP,
+    reach: tuple[float, float] = REACH,
+) -> bool:
     """The blocks (n, 2) keep their distances to each other, to the base place (2,) and to the arm's axis."""
-    reach = np.linalg.norm(places - arm_axis, axis=1)
+    away = np.linalg.norm(places - arm_axis, axis=1)
     between = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
     return bool(
-        (reach >= NEAREST).all()
-        and (reach <= FARTHEST).all()
+        (away >= reach[0]).all()
+        and (away <= reach[1]).all()
         and (np.abs(places) <= TABLE_EDGE).all()
         and (between >= BLOCK_GAP).all()
         and (np.linalg.norm(places - base, axis=1) >= base_gap).all()

@@ -13,7 +13,7 @@ import numpy as np
 from ..planner import screw
 from ..planner.jit import kernel
 from .pour_geometry import SOURCE, TARGET
-from .scene import ARM, BEAD, FINGERS, FIRST_OBJECT, FURNITURE
+from .scene import ARM, BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OTHER_ARM, OTHER_FINGERS
 from .state import State
 from .things import TABLE_HEIGHT
 
@@ -90,13 +90,18 @@ def tilt_of(pose):
 def allowed_contact(low, high, at_home):
     """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
 
-    Wanted are the fingers on the source, the source on its stand as long as it is there, and the target on its
-    own. Beads may touch anything: where they end is judged by itself. A robot's contact with itself says nothing.
+    Wanted are the fingers on the source, those of a second arm on the target, the source on its stand as long as it
+    is there, and the target on its own. Beads may touch anything: where they end is judged by itself. A robot's
+    contact with itself says nothing.
     """
-    if low == high or (low == ARM and high == FINGERS) or low == BEAD or high == BEAD:
+    if low in (high, BEAD) or high == BEAD or (low == ARM and high == FINGERS):
+        return True
+    if low == OTHER_ARM and high == OTHER_FINGERS:
         return True
     if low == FINGERS:
         return high == FIRST_OBJECT + SOURCE
+    if low == OTHER_FINGERS:
+        return high == FIRST_OBJECT + TARGET
     if low == FURNITURE:
         return high == FIRST_OBJECT + TARGET or (at_home and high == FIRST_OBJECT + SOURCE)
     return False
@@ -157,11 +162,12 @@ class PourProgress:
         sizes: (2, 2) radius and height [m] of both glasses.
         beads: how many there are.
         dt: seconds between states.
+        in_hand: there is no stand to lift the source from.
     """
 
-    def __init__(self, start: np.ndarray, sizes: np.ndarray, beads: int, dt: float):
+    def __init__(self, start: np.ndarray, sizes: np.ndarray, beads: int, dt: float, *, in_hand: bool = False):
         self.count, self._sizes = beads, sizes
-        self._memory = np.concatenate([start[SOURCE, :3], np.zeros(4)])
+        self._memory = np.concatenate([start[SOURCE, :3], [float(in_hand)], np.zeros(3)])
         self._needed, self._settled_steps = round(SETTLED_SECONDS / dt), 0
         self.verdict = Verdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
         self.collisions = 0

@@ -39,7 +39,7 @@ TURNS = np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0))
 MARGIN = 0.1
 """Least distance of a joint to its limit [rad] where the source is in the hand from the start."""
 MAX_STARTS = 200
-VIEW = View((-0.12, -0.02, 1.0), 1.25, 150.0, -18.0)
+VIEW = View((-0.14, -0.02, 1.06), 1.42, 150.0, -17.0)
 
 
 class PourEnv(OneDemoEnv):
@@ -167,6 +167,7 @@ class PourEnv(OneDemoEnv):
             fixtures=self.sim.scene.fixtures,
             gripper_width=widths,
             furniture=tuple(TaskFurniture.of(each) for each in STANDS),
+            obstacles=SLOTS,
         )
         self._place(self._nominal)
 
@@ -196,7 +197,8 @@ class PourEnv(OneDemoEnv):
                 raise UnknownName("reset option", key, OPTIONS)
         given = checked_stands(options["stands"], self._axis) if "stands" in options else None
         wanted = checked_joints(options["joint_positions"], self.arms) if "joint_positions" in options else None
-        ranges, gap = RANGES[layout], LONG_GAP if spacious else GAP
+        ranges = RANGES[layout]
+        gap = LONG_GAP if spacious and ranges.source else GAP
         for _ in range(MAX_STARTS):
             tops = pour_layout(self.np_random, ranges, self._nominal, self._axis, gap) if given is None else given
             offsets = self.np_random.uniform(-ranges.joints, ranges.joints, self._ready.shape)
@@ -237,19 +239,18 @@ class PourEnv(OneDemoEnv):
     def _legs(self, start: Start) -> list[Leg]:
         """The carry: from above the source's stand to before the target, turned with the arm."""
         glass, rim, center = GLASSES[SOURCE], self._goal_pose[0, :3], start.objects[SOURCE, :3]
-        hand = grasp(glass, center, self._yaw_at(center))
-        yaw = self._yaw_at(rim)
+        hand = grasp(glass, center, self._yaw_at(center, SOURCE))
+        yaw = self._yaw_at(rim, TARGET)
         above = [Pose.from_position_quaternion([0.0, 0.0, up]) @ hand for up in (*ABOVE, RAISED)]
         before, after = pouring(glass, rim, yaw, 0.0, BACK, UP), pouring(glass, rim, yaw, TILTED)
         keys = tuple((pose,) for pose in (*above[:-1], before, after))
         return [Leg(above[-1], before, keys, glass.shape, tcp_from_glass(glass), motion=1)]
 
-    def _yaw_at(self, place: np.ndarray) -> float:
-        """Direction [rad] of a level hand at a place (2 or 3,): the ready hand's, turned with the arm about its base."""
-        x, y = place[:2] - self._axis
-        source = self._nominal[SOURCE, :2] - self._axis
+    def _yaw_at(self, place: np.ndarray, glass: int) -> float:
+        """Direction [rad] of a level hand: the ready one's, turned about the arm's base as the glass's place is."""
         approach = self.arms[0].fk(self._ready[0]).rotation[:2, 2]
-        turned = np.arctan2(y, x) - np.arctan2(source[1], source[0])
+        was, now = self._nominal[glass, :2] - self._axis, place[:2] - self._axis
+        turned = np.arctan2(now[1], now[0]) - np.arctan2(was[1], was[0])
         return float(np.arctan2(approach[1], approach[0]) + turned)
 
     def _goals(self) -> tuple[np.ndarray, float]:

@@ -8,6 +8,7 @@ IDS = {
     "onedemo/Stack-v0": ("onedemo.envs.stacking:StackEnv", 3000),
     "onedemo/Shelve-v0": ("onedemo.envs.shelving:ShelveEnv", 4500),
     "onedemo/Pour-v0": ("onedemo.envs.pouring:PourEnv", 2000),
+    "onedemo/BimanualPour-v0": ("onedemo.envs.bimanual_pouring:BimanualPourEnv", 2000),
 }
 """Id: entry point and time limit in control steps."""
 

@@ -9,9 +9,10 @@ import mujoco
 import numpy as np
 
 from ..planner.chain import FRAME
+from .arm_index import ArmIndex
 from .nearness import Nearness
 from .obstacles import Intruder, ObstacleSlots
-from .scene import FIRST_OBJECT, ArmIndex, compiled_scene
+from .scene import FIRST_OBJECT, compiled_scene
 from .state import State, command, read_arms, read_objects
 from .things import Things
 
@@ -41,8 +42,8 @@ class Start(NamedTuple):
 class Simulation:
     """A scene being simulated: state in, physics, state out."""
 
-    def __init__(self, robot: str, things: Things):
-        self.scene = compiled_scene(robot, things)
+    def __init__(self, robot: str, things: Things, sides: tuple[str, ...] | None = None):
+        self.scene = compiled_scene(robot, things, sides)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         arms, data, model = self.scene.arms, self.data, self.model
@@ -52,8 +53,8 @@ class Simulation:
         self._servos = np.array([arm.ctrl for arm in arms])
         self._grips = np.array([np.column_stack([arm.grip, arm.opened, arm.closed]) for arm in arms])
         offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
-        sides = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
-        self._homes = np.column_stack([sides, offsets])
+        attitudes = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
+        self._homes = np.column_stack([attitudes, offsets])
         self._chains = np.array([arm.arm.chain for arm in arms])
         self._frames = np.empty((arms[0].arm.dof, FRAME))
         self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
@@ -70,12 +71,9 @@ class Simulation:
         mujoco.mj_resetData(self.model, self.data)
         grips = np.full(len(self.scene.arms), np.nan) if start.grips is None else start.grips
         for arm, q, gap, widest in zip(self.scene.arms, start.joints, grips, self._widest, strict=True):
-            self.data.qpos[arm.qpos] = q
-            self.data.act[arm.act] = q
-            closing = np.isfinite(gap)
-            inwards = 0.5 * (widest - gap) * np.sign(arm.closed - arm.opened) if closing else 0.0
-            self.data.ctrl[arm.grip] = arm.closed if closing else arm.opened
-            self.data.qpos[arm.finger_qpos] = arm.opened + inwards
+            self._put(arm, q, 0.5 * (widest - gap) if np.isfinite(gap) else 0.0)
+        for arm, q in zip(self.scene.parked, self.scene.parked_joints, strict=True):
+            self._put(arm, q, 0.0)
         for address, pose in zip(self._object_places, start.objects, strict=True):
             self.data.qpos[address : address + 7] = pose
         if len(start.furniture):
@@ -92,6 +90,13 @@ class Simulation:
         address, dof = self._object_index[index]
         self.data.qpos[address : address + 7] = pose
         self.data.qvel[dof : dof + 6] = 0.0
+
+    def _put(self, arm: ArmIndex, q: np.ndarray, inwards: float) -> None:
+        """Put an arm at joints q (dof,), open, or closing with each finger some way [m] inwards."""
+        self.data.qpos[arm.qpos] = q
+        self.data.act[arm.act] = q
+        self.data.ctrl[arm.grip] = arm.closed if inwards else arm.opened
+        self.data.qpos[arm.finger_qpos] = arm.finger_open + inwards * arm.finger_inwards
 
     def advance_obstacles(self, seconds: float, motion: float) -> None:
         """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""
@@ -145,9 +150,9 @@ class Simulation:
         return abs(float((left - right) @ closing))
 
     def _measured_opening(self, arm: ArmIndex) -> float:
-        """Gap of the open pads [m]; leaves the gripper open in the state."""
+        """Gap of the open pads [m]; leaves the grippers open in the state."""
         mujoco.mj_resetData(self.model, self.data)
         for each in self.scene.arms:
-            self.data.qpos[each.finger_qpos] = each.opened
+            self.data.qpos[each.finger_qpos] = each.finger_open
         mujoco.mj_forward(self.model, self.data)
         return mujoco.mj_geomDistance(self.model, self.data, *arm.pads, 1.0, None)

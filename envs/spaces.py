@@ -15,6 +15,8 @@ JOINT_SLACK = 0.1
 """A soft joint limit gives way by less than this [rad]."""
 LARGEST_OBSTACLE, FASTEST_OBSTACLE = 1.0, 2.0
 """Bounds of an obstacle's extents [m] and speed [m/s]."""
+LOOSE = 1.5
+"""Bound of the gap between the pads by the widest: fingers on linkages give way when the hand is swung."""
 MAX_SPEED = 20.0
 """Bound of measured joint speeds [rad/s]; the servos command at most 3."""
 
@@ -62,7 +64,7 @@ def observation_space(
             "joint_positions": box(lower, upper, shape),
             "joint_velocities": box(-MAX_SPEED, MAX_SPEED, shape),
             "tcp_pose": pose_box(len(arms)),
-            "gripper_opening": box(0.0, np.array(gripper_width) + 0.01, (len(arms),)),
+            "gripper_opening": box(0.0, LOOSE * np.array(gripper_width), (len(arms),)),
             "object_pose": pose_box(objects),
             "goal_pose": pose_box(goals),
             "motion_index": box(0.0, float(motions), (1,)),

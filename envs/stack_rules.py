@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..planner.jit import kernel
-from .scene import ARM, FINGERS, FIRST_OBJECT, WORLD
+from .scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, WORLD
 from .state import State
 from .things import TABLE_HEIGHT
 
@@ -77,7 +77,7 @@ def allowed_contact(low, high, placed):
     Wanted are blocks on the table, a block on the next lower one of the stack, and the fingers on the block that
     is being fetched, held or was let go last. A robot's contact with itself says nothing.
     """
-    if low == high or (low == ARM and high == FINGERS):
+    if low == high or (low == ARM and high == FINGERS) or (low == OTHER_ARM and high == OTHER_FINGERS):
         return True
     if high < FIRST_OBJECT or low == ARM:
         return False

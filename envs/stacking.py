@@ -10,11 +10,12 @@ from ..planner.errors import BadOption, UnknownName
 from ..planner.pose import Pose
 from ..planner.shapes import Box
 from .base import SLOTS, OneDemoEnv
-from .bodies import robot_body
 from .layouts import BASE_GAP, LONG_GAP, RANGES, TABLE_EDGE, Layout, stack_layout
 from .options import checked_joints, checked_poses
 from .placement import Leg, Order
 from .render import Ghost
+from .robot_parts import robot_parts
+from .robots import robot_named
 from .sim import Start
 from .spaces import observation_space
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress
@@ -44,7 +45,7 @@ class StackEnv(OneDemoEnv):
     of its place, touched by no finger, standing still, the hand withdrawn by 5 cm, for half a second.
 
     ## Action Space
-    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
 
     | control mode | entry | meaning |
     |---|---|---|
@@ -78,7 +79,8 @@ class StackEnv(OneDemoEnv):
     ## Starting State
     By `level`: L0 the nominal row; L1 blocks moved by up to 10 cm and turned by up to 30 degrees, the base place by
     up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
-    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis.
+    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis (Baxter: 0.34 to 0.74 m):
+    where its hand can point straight down.
 
     L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way of the hand, L4 one that
     swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the forearm passes.
@@ -98,7 +100,8 @@ class StackEnv(OneDemoEnv):
     ## Arguments
     `robot="Panda"`, `n_blocks=3` (2 to 6), `level="L1"`, `obstacles=None` (what the level says) or `"none" |
     "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
+    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`,
+    `arm=None` (the robot's usual one; Baxter has "right" and "left", of which the other is parked).
     `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `object_poses` (n, 7),
     `base_pose` (7,) of the lowest block's goal, and `joint_positions` (7,).
 
@@ -116,9 +119,12 @@ class StackEnv(OneDemoEnv):
         reward: str = "sparse",
         control_frequency: int = 50,
         render_mode: str | None = None,
+        arm: str | None = None,
     ):
         if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 2 <= n_blocks <= 6:
             raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 2 to 6")
+        kind = robot_named(robot)
+        kind.check_grip(BLOCK, robot, "a block")
         blocks = tuple(Solid(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
         super().__init__(
             robot=robot,
@@ -129,8 +135,10 @@ class StackEnv(OneDemoEnv):
             reward=reward,
             render_mode=render_mode,
             control_frequency=control_frequency,
+            arms=kind.checked_arms(arm, robot),
         )
-        self.n_blocks = n_blocks
+        self.n_blocks, self._reach = n_blocks, kind.reach
+        parts = robot_parts(robot, self.sim.scene)
         widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
         self.observation_space = observation_space(self.arms, widths, n_blocks, n_blocks, 2 * n_blocks, SLOTS)
         self._task = TaskDescription(
@@ -139,11 +147,12 @@ class StackEnv(OneDemoEnv):
             arms=self.arms,
             control_dt=self.control_dt,
             objects=tuple(TaskObject.of(block) for block in blocks),
-            bodies=tuple(robot_body(robot, k) for k in range(len(self.arms))),
+            bodies=parts.bodies,
             table_height=TABLE_HEIGHT,
-            fixtures=self.sim.scene.fixtures,
+            fixtures=parts.fixtures,
             gripper_width=widths,
             obstacles=SLOTS,
+            touching=parts.touching,
         )
         self._goal_pose = np.zeros((n_blocks, 7))
         self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
@@ -158,9 +167,9 @@ class StackEnv(OneDemoEnv):
             if key not in OPTIONS:
                 raise UnknownName("reset option", key, OPTIONS)
         home = self.sim.scene.home
-        axis = np.array(self.sim.model.body("robot0_base").pos[:2])
+        axis = self.arms[0].chain[0, 4:6]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
-        drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap)
+        drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap, self._reach)
         poses, base = _poses(drawn)
         if "object_poses" in options:
             poses = checked_poses("object_poses", options["object_poses"], self.n_blocks)

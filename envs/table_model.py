@@ -20,8 +20,9 @@ from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
 from robosuite.utils.mjcf_utils import CustomMaterial
 
 from .model_parts import bead_bodies, book_body, furniture_body, glass_body, obstacle_bodies, solid_body
-from .servos import leave_out_unused, use_velocity_servos
+from .servos import leave_out_unused, mend_robot, use_velocity_servos
 from .things import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, Glass, Solid, Things, half_sizes
+from .trunk import slice_trunk
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
 FRICTION = (1.0, 0.005, 0.0001)
@@ -31,10 +32,11 @@ FRICTION = (1.0, 0.005, 0.0001)
 class OneDemoTableScene(ManipulationEnv):
     """Robot, table and things; used for its model only."""
 
-    def __init__(self, robot: str, things: Things):
-        self.things = things
+    def __init__(self, robot: str, gripper: str, things: Things, place: tuple[float | None, float]):
+        self.things, self.place = things, place
         super().__init__(
             robots=robot,
+            gripper_types=gripper,
             controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
             use_camera_obs=False,
             has_renderer=False,
@@ -48,7 +50,8 @@ class OneDemoTableScene(ManipulationEnv):
         super()._load_model()
         robots: Any = self.robots
         robot_model, side = robots[0].robot_model, 2 * TABLE_HALF_SIZE
-        robot_model.set_base_xpos(robot_model.base_xpos_offset["table"](side))
+        x, y, z = robot_model.base_xpos_offset["table"](side)
+        robot_model.set_base_xpos((x if self.place[0] is None else self.place[0], y + self.place[1], z))
         arena: Any = TableArena(table_full_size=(side, side, 0.05), table_offset=(0, 0, TABLE_HEIGHT))
         arena.set_origin([0, 0, 0])
         arena.table_visual.attrib.pop("material", None)
@@ -56,6 +59,8 @@ class OneDemoTableScene(ManipulationEnv):
         wooden = [_wooden(each) for each in self.things.objects if isinstance(each, Solid) and each.texture]
         self.model = ManipulationTask(arena, [robot_model], wooden)
         self.model.worldbody.extend(_other_bodies(self.things))
+        slice_trunk(self.model.root)
+        mend_robot(self.model.root)
         use_velocity_servos(self.model.root, set(robot_model.joints))
         leave_out_unused(self.model.root)
 
@@ -92,7 +97,7 @@ def _wooden(block: Solid) -> BoxObject:
     )
 
 
-def table_env(robot: str, things: Things) -> Any:
-    """A robosuite environment with the compiled model of the scene."""
+def table_env(robot: str, gripper: str, things: Things, place: tuple[float | None, float]) -> Any:
+    """A robosuite environment with the compiled model of the scene; `gripper` and `place`: see `Robot`."""
     ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
-    return OneDemoTableScene(robot, things)
+    return OneDemoTableScene(robot, gripper, things, place)

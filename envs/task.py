@@ -97,6 +97,7 @@ class TaskDescription:
         fixtures: what stands still for ever: the table (named "table"), the robot's stand; no floor.
         gripper_width: largest distance between the finger pads [m], one per arm.
         furniture: in the order of `furniture_pose`.
+        touching: pairs (part of a body, fixture) that nobody needs to look at: a shoulder and the trunk it sits in.
         obstacles: how many there can be, the length of `obstacle_active`.
     """
 
@@ -110,4 +111,5 @@ class TaskDescription:
     fixtures: tuple[Obstacle, ...]
     gripper_width: tuple[float, ...]
     furniture: tuple[TaskFurniture, ...] = ()
+    touching: tuple[tuple[str, str], ...] = ()
     obstacles: int = 0

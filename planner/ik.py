@@ -1,4 +1,4 @@
-"""Inverse kinematics by the controller's own law, and which part of a path an arm can reach."""
+"""Inverse kinematics by the controller's own law."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from . import screw
 from .arm import Arm
 from .controller import ControllerSettings, joint_velocity
 from .jit import kernel
-from .pose import Pose, PosePath
+from .pose import Pose
 from .workspace import LIMITS, bound, pose_and_jacobian
 
 POSITION_TOLERANCE, ANGLE_TOLERANCE = 1e-4, 1e-3
@@ -33,18 +33,6 @@ def _solve(work, target, q, iterations, qdot):
     return False
 
 
-@kernel
-def _margins(work, path, q, qdot, margins):
-    """Joint margin at each pose, walking backwards from a solution q of the last one."""
-    margins[:] = -np.inf
-    for k in range(len(path) - 1, -1, -1):
-        if not _solve(work, screw.load8(path, k), q, 60, qdot):
-            return
-        margins[k] = np.inf
-        for i in range(len(q)):
-            margins[k] = min(margins[k], q[i] - work[LIMITS, i], work[LIMITS + 1, i] - q[i])
-
-
 def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: int = 300) -> np.ndarray | None:
     """Joints (dof,) that reach the pose within 0.1 mm and 1 mrad from a seed (dof,), or None.
 
@@ -53,16 +41,6 @@ def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: i
     q = np.array(seed, dtype=np.float64)
     goal = tuple(float(value) for value in target.dq)
     return q if _solve(_unhurried(arm), goal, q, iterations, np.empty(arm.dof)) else None
-
-
-def path_margins(arm: Arm, path: PosePath, goal_joints: ArrayLike) -> np.ndarray:
-    """Joint margins (n,) [rad] of a path walked backwards from joints (dof,) that reach its last pose.
-
-    -inf from the first pose on, seen from the end, that has no solution near the one before.
-    """
-    margins = np.empty(len(path))
-    _margins(_unhurried(arm), path.dqs, np.array(goal_joints, dtype=np.float64), np.empty(arm.dof), margins)
-    return margins
 
 
 def _unhurried(arm: Arm) -> np.ndarray:

@@ -308,3 +308,7 @@ def warm_up(arm: Arm, body: Body) -> None:
         planner.step(q)
         planner.see(tuple(obstacle.at(0.02) for obstacle in seen))
         planner.step(q)
+    # what names what is in the way
+    scene = SceneWork.of(arm, body, things, planner.settings.plan)
+    scene.tightest(q)
+    scene.tightest_of_tool(path[0])

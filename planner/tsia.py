@@ -7,12 +7,11 @@ the start to a guiding pose on it along one screw, and then is the imitated path
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from . import dualquat as dq
-from .errors import BadOption, PlanFailed
+from .errors import BadOption
 from .pose import METERS_PER_RADIAN, Pose, PosePath
 
 STILL = 1e-9
@@ -116,29 +115,3 @@ def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
     # one way round for the whole path: the scalar part between the two is the same at every pose
     way = 1.0 if dq.mul(dq.conj(from_start.dqs[0]), to_goal.dqs[0])[0] >= 0.0 else -1.0
     return PosePath(dq.sclerp(from_start.dqs, way * to_goal.dqs, s * s * (3.0 - 2.0 * s), shortest=False))
-
-
-def reachable_guide(
-    path: PosePath, first: int, last: int, margins: Callable[[PosePath], np.ndarray], min_margin: float
-) -> int:
-    """The first guide index from `first` on whose whole tail can be reached, at most `last`.
-
-    The imitated path may leave the workspace though start and goal do not.
-
-    Args:
-        path: the imitated path.
-        first: the guide that one would take.
-        last: the guide beyond which too little of the path is left.
-        margins: joint margins [rad] of the poses of a path, -inf where there is no joint solution.
-        min_margin: smallest margin [rad] that counts as reachable.
-
-    Raises:
-        PlanFailed: "ik_or_limit", no tail from `last` on can be reached.
-
-    Not in the paper.
-    """
-    bad = np.flatnonzero(margins(path[first:]) < min_margin)
-    guide = first + (int(bad[-1]) + 1 if len(bad) else 0)
-    if guide > last:
-        raise PlanFailed("ik_or_limit", f"the imitated path cannot be reached behind {guide / len(path):.0%} of it")
-    return guide

@@ -18,7 +18,7 @@ LOWER = {
     "bench": {"planner", "envs", "baselines", "configs"},
 }
 ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit", "chain", "screw", "shapes", "body", "body_models"}
-ENVS_MAY_USE |= {"proximity", "ik"}
+ENVS_MAY_USE |= {"proximity", "ik", "models"}
 """The planner's lowest floor: geometry and kinematics, no method."""
 PLANNER_ORDER = [
     "errors",
@@ -89,14 +89,19 @@ ENVS_ORDER = [
     "spaces",
     "state",
     "servos",
+    "trunk",
     "model_parts",
     "table_model",
+    "robots",
+    "arm_index",
+    "static_shapes",
     "scene",
     "beads",
     "bodies",
     "obstacles",
     "nearness",
     "rooms",
+    "robot_parts",
     "placement",
     "levels",
     "sim",
@@ -113,6 +118,7 @@ ENVS_ORDER = [
     "pour_layouts",
     "pour_rules",
     "pouring",
+    "bimanual_pouring",
     "registration",
     "__init__",
 ]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from onedemo.envs.bodies import fitted_bodies, robot_body
-from onedemo.envs.scene import ROBOTS, compiled_scene
+from onedemo.envs.robots import ROBOTS
+from onedemo.envs.scene import compiled_scene
 from onedemo.planner.errors import UnknownName
 from onedemo.planner.shapes import Box, Cylinder
 

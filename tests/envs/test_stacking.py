@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.envs.layouts import BASE_GAP, BLOCK_GAP, FARTHEST, NEAREST, RANGES, fits, nominal_blocks, stack_layout
+from onedemo.envs.layouts import BASE_GAP, BLOCK_GAP, RANGES, REACH, fits, nominal_blocks, stack_layout
 from onedemo.envs.scene import ARM, FINGERS, FIRST_OBJECT, WORLD
 from onedemo.envs.stack_rules import BLOCK_SIZE, StackProgress, allowed_contact
 from onedemo.envs.state import read_arms, read_objects
@@ -139,7 +139,7 @@ def test_layouts_keep_their_ranges_and_distances(seed, name, count):
     assert np.abs(layout.joints).max() <= level.joints
     places = layout.blocks[:, :2]
     for k in range(count):
-        assert NEAREST <= np.linalg.norm(places[k] - AXIS) <= FARTHEST
+        assert REACH[0] <= np.linalg.norm(places[k] - AXIS) <= REACH[1]
         assert np.linalg.norm(places[k] - layout.base[:2]) >= BASE_GAP
         for j in range(k):
             assert np.linalg.norm(places[k] - places[j]) >= BLOCK_GAP

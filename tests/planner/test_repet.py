@@ -141,7 +141,7 @@ def test_a_closed_cage_is_an_honest_failure_and_leaves_its_tree():
     for seed in range(10):
         path, tool, obstacles = tool_problem("cage", seed)
         escape = escape_path(path, tool, obstacles, seed=seed)
-        assert escape.reason == "no escape found"
+        assert escape.reason in ("no escape found", "node limit reached")
         assert not escape.found and not escape.detours
         assert escape.path is path
         assert 1 < len(escape.tree.poses) <= DEFAULTS.nodes

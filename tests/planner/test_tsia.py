@@ -9,14 +9,13 @@ from hypothesis import strategies as st
 from strategies import assert_same_pose, for_all, random_dq, random_path
 
 from onedemo.planner import dualquat as dq
-from onedemo.planner.errors import BadOption, PlanFailed
+from onedemo.planner.errors import BadOption
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.tsia import (
     departure,
     final_path,
     guide_index,
     imitated_path,
-    reachable_guide,
     screw_path,
     transfer_to,
     two_sided_path,
@@ -253,16 +252,3 @@ def test_two_sided_imitation_does_not_jump_when_the_goal_is_turned_half_around(s
     goal = Pose.from_yaw([0.3, 0.2, 0], np.pi - short_of_half_turn) @ shown[-1]
     path = two_sided_path(shown, shown[0], goal)
     assert np.max(dq.gap(path.dqs[:-1], path.dqs[1:])[1]) < 0.3
-
-
-def test_the_guide_moves_behind_the_last_pose_that_cannot_be_reached():
-    def margins_with(bad):
-        return lambda part: np.where(np.isin(np.arange(len(LINE))[-len(part) :], bad), 0.09, 0.1)
-
-    for bad, guide in [([], 2), ([0, 1], 2), ([2], 3), ([0, 4], 5), ([3, 7], 8)]:
-        assert reachable_guide(LINE, 2, 8, margins_with(bad), 0.1) == guide
-    for bad in ([8], [10], [2, 9]):
-        with pytest.raises(PlanFailed, match="ik_or_limit") as caught:
-            reachable_guide(LINE, 2, 8, margins_with(bad), 0.1)
-        assert caught.value.reason == "ik_or_limit"
-    assert reachable_guide(LINE, 2, 8, lambda part: np.full(len(part), -np.inf), -np.inf) == 2
