@@ -17,7 +17,7 @@ from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
-from ..planner.tsia import imitated_path
+from ..planner.tsia import imitated_path, screw_path
 from .choice import Choice, Leg
 from .hand import CLOSE, OPEN, Hand
 from .policy import LabeledPath
@@ -56,7 +56,7 @@ class ShelveProgram:
     def _awaited(self, k: int) -> Iterator[np.ndarray]:
         """Open the hand, and rise out of the way until book k lies on the stand: nobody reaches under an arm."""
         yield from self.hand.grip(OPEN, self.settings.open)
-        out_of_the_way = () if self._on_stand(k) else self.hand.follow(self._from_here("lift"), loosely=True)
+        out_of_the_way = () if self._on_stand(k) else self.hand.follow(self._rise(), loosely=True)
         for action in out_of_the_way:
             yield action
             if self._on_stand(k):
@@ -67,6 +67,13 @@ class ShelveProgram:
                 raise PlanFailed("timeout", f"{self.task.objects[k].name} was not handed over")
             left -= 1
             yield self.hand.still()
+
+    def _rise(self) -> PosePath:
+        """Straight up from here by as much as the demonstrated lift: the hand is turned otherwise than there."""
+        here, lift = self.hand.arm.fk(self.hand.q), self._parts["lift"]
+        height = lift[-1].position[2] - lift[0].position[2]
+        up = Pose.from_position_quaternion([0.0, 0.0, height])
+        return screw_path(here, up @ here, self.settings.resample)
 
     def _on_stand(self, k: int) -> bool:
         names = [each.name for each in self.task.furniture]

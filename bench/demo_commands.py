@@ -142,9 +142,10 @@ def record(
     check_writable("--output", output)
     if task not in RECORDERS:
         raise UnknownName("scripted demonstration", task, RECORDERS)
-    env = gym.make(TASKS[task].id, level="L0")
+    recorder = RECORDERS[task]
+    env = gym.make(TASKS[task].id, level="L0", **recorder.scene)
     with console(stderr=True).status("moving the arm"):
-        demo = RECORDERS[task](env.unwrapped)
+        demo = recorder.record(env.unwrapped)
     env.close()
     with writing("--output", output):
         save_demonstration(demo, output)

@@ -9,7 +9,7 @@ import numpy as np
 from ..planner.errors import BadOption, UnknownName
 from ..planner.pose import Pose
 from ..planner.shapes import Box, Obstacle, pack
-from .base import SLOTS, Observation, OneDemoEnv, checked_choice
+from .base import MAX_LAYOUTS, SLOTS, Observation, OneDemoEnv, checked_choice
 from .bodies import robot_body
 from .options import checked_joints
 from .placement import Leg, Order
@@ -35,7 +35,9 @@ GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0
 SPREAD = 0.15
 """Of obstacles about the hand's way [m]: a book and the hand behind it sweep far more than the way itself, which is
 so short that what lies right on it would be in the way of the hand before the slot, too."""
-CLEAR = 0.10
+START_CLEAR = 0.03
+"""The robot is at least this far from the first book at the start [m]."""
+CLEAR = 0.08
 """The robot is at least this far from the stand while a book is put there [m]."""
 PAPER_SIZES = (0.06, 0.09)
 """Of the obstacles that appear while the second and the third book are placed [m]."""
@@ -51,7 +53,7 @@ class ShelveEnv(OneDemoEnv):
     apart. They are held by friction between the fingers only.
 
     Handing over is the human's part, and the environment plays it: books that are not handed over yet wait in a
-    pile on the table, and when book k is in its slot, let go, and the whole robot is 10 cm away from the stand, the
+    pile on the table, and when book k is in its slot, let go, and the whole robot is 8 cm away from its place, the
     next book is taken from the pile and laid onto the stand at once. The robot never touches a book that is moved
     so. Everything else is physics.
 
@@ -188,30 +190,43 @@ class ShelveEnv(OneDemoEnv):
         for key in options:
             if key not in OPTIONS:
                 raise UnknownName("reset option", key, OPTIONS)
-        drawn = shelf_layout(self.np_random, RANGES[layout], self.n_books, self._ready.shape)
-        drawn = given_layout(drawn, options)
-        joints = np.clip(self._ready + drawn.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
-        if "joint_positions" in options:
-            joints = checked_joints(options["joint_positions"], self.arms)
+        drawn, joints = self._drawn_clear(options, layout)
         self._take_layout(drawn)
         return Start(joints, drawn.objects(), self._furniture)
+
+    def _drawn_clear(self, options: dict[str, Any], layout: str) -> tuple[ShelfLayout, np.ndarray]:
+        """A layout and start joints at which the hand is not already at the book."""
+        lower, upper = [arm.lower for arm in self.arms], [arm.upper for arm in self.arms]
+        for _ in range(MAX_LAYOUTS):
+            drawn = shelf_layout(self.np_random, RANGES[layout], self.n_books, self._ready.shape)
+            drawn = given_layout(drawn, options)
+            if "joint_positions" in options:
+                return drawn, checked_joints(options["joint_positions"], self.arms)
+            joints = np.clip(self._ready + drawn.joints, lower, upper)
+            if self._is_clear(drawn.handed(0), joints, START_CLEAR):
+                return drawn, joints
+        raise BadOption("stand_pose", "the robot would start at the book; give joint_positions that are away from it")
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step; afterwards the next book is handed over, if it is time."""
         reached = super().step(action)
         k = self._progress.handed
-        if k < self.n_books and self._progress.placed >= k and self._is_clear(self._drawn.handed(k), reached[0]):
+        if (
+            k < self.n_books
+            and self._progress.placed == k
+            and self._is_clear(self._drawn.handed(k), reached[0]["joint_positions"], CLEAR)
+        ):
             pose = self._drawn.handed(k).vector
             self.sim.put(k, pose)
             self._progress.hand_over(pose)
         return reached
 
-    def _is_clear(self, place: Pose, observation: Observation) -> bool:
-        """Whether the whole robot is away from where a book is to be put."""
+    def _is_clear(self, place: Pose, joints: np.ndarray, room: float) -> bool:
+        """Whether the whole robot, at joints (n_arms, dof), is `room` away from where a book is or is to be put."""
         book = pack([Obstacle(Box(BOOK_SIZE), place)])
         return all(
-            arm_room(arm, body, q, book) >= CLEAR
-            for arm, body, q in zip(self.arms, self._task.bodies, observation["joint_positions"], strict=True)
+            arm_room(arm, body, q, book) >= room
+            for arm, body, q in zip(self.arms, self._task.bodies, joints, strict=True)
         )
 
     def _legs(self, start: Start) -> list[Leg]:
