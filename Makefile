@@ -33,10 +33,10 @@ demo: $(VENV)/.installed ## stack three blocks from one demonstration: report, f
 	@$(BIN)/onedemo run configs/bench/stack.yaml
 
 test: $(VENV)/.developed ## run the tests
-	@$(BIN)/python -m pytest -m "not slow"
+	@$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
 
 slow: $(VENV)/.developed ## run the long tests too, on newly drawn values
-	@$(BIN)/python -m pytest --hypothesis-profile=default
+	@$(BIN)/python -m pytest --hypothesis-profile=default -n 2 --dist loadfile
 
 lint: $(VENV)/.developed ## ruff
 	@$(BIN)/ruff check $(FOLDERS)

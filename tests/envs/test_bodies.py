@@ -13,7 +13,9 @@ from onedemo.planner.errors import UnknownName
 from onedemo.planner.shapes import Box, Cylinder
 
 
-@pytest.mark.parametrize("robot", sorted(ROBOTS))
+@pytest.mark.parametrize(
+    "robot", ["Panda", *[pytest.param(name, marks=pytest.mark.slow) for name in sorted(set(ROBOTS) - {"Panda"})]]
+)
 def test_the_shipped_table_is_what_is_fitted(robot):
     for k, body in enumerate(fitted_bodies(robot)):
         shipped = robot_body(robot, k)
