@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 CUPBOARD, STAND = "cupboard", "stand"
 LOST = 0.03
 """Distance [m] of a book from where it should be in the hand beyond which it was dropped."""
+BETWEEN = 0.07
+"""Way back [m] after which the fingers are no longer between books."""
 PATIENCE = 5.0
 """Seconds that a book is waited for."""
 
@@ -102,9 +104,8 @@ class ShelveProgram:
             raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
 
     def _shelve(self, k: int) -> Iterator[np.ndarray]:
-        name = self.task.objects[k].name
-        neighbors = tuple(each.name for each in self.task.objects[:k])
-        touching = (("held", CUPBOARD), *_around(neighbors))
+        names = [each.name for each in self.task.objects]
+        touching = (("held", CUPBOARD), *_around(names[:k] + names[k + 1 :]))
         # the book slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held(k)
         insertion = self._insertion(k, held)
@@ -116,10 +117,15 @@ class ShelveProgram:
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(self._release, self.settings.open)
         self.hand.release()
-        self.hand.allow(_around((*neighbors, name)))
+        self.hand.allow(_around(names))
 
     def _retreat(self) -> Iterator[np.ndarray]:
-        yield from self.hand.follow(self._from_here("retreat"), loosely=True)
+        """Straight back: from between the books first, where a detour would push them over."""
+        path = self._from_here("retreat")
+        free = int(np.argmax(np.linalg.norm(path.positions - path.positions[0], axis=1) > BETWEEN))
+        yield from self.hand.follow(path[: free + 1], loosely=True)
+        self.hand.allow(())
+        yield from self.hand.follow(path[free:], loosely=True)
 
     def _insertion(self, k: int, held: Pose) -> PosePath:
         """The demonstrated insertion, to where the hand lets go so that the book is in its slot."""
