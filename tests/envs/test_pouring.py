@@ -14,7 +14,17 @@ from onedemo.envs.beads import poured_into, settled_beads, settling
 from onedemo.envs.pour_geometry import BEADS, GLASSES, SOURCE, TARGET, TILTED, grasp, pouring, tcp_from_glass
 from onedemo.envs.pour_layouts import FARTHEST, GAP, NEAREST, PLACES, RANGES, pour_layout
 from onedemo.envs.pour_rules import PourProgress, allowed_contact, beads_inside
-from onedemo.envs.scene import ARM, BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OBSTACLE, WORLD
+from onedemo.envs.scene import (
+    ARM,
+    BEAD,
+    FINGERS,
+    FIRST_OBJECT,
+    FURNITURE,
+    OBSTACLE,
+    OTHER_ARM,
+    OTHER_FINGERS,
+    WORLD,
+)
 from onedemo.envs.state import State
 from onedemo.planner.errors import OneDemoError
 from onedemo.planner.pose import Pose
@@ -136,6 +146,7 @@ def test_a_source_that_was_lifted_and_has_toppled_was_dropped():
 def test_wanted_contacts_are_listed_and_all_others_are_not():
     source, target = FIRST_OBJECT + SOURCE, FIRST_OBJECT + TARGET
     wanted = {(ARM, FINGERS), (FINGERS, source), (FURNITURE, source), (FURNITURE, target)}
+    wanted |= {(OTHER_ARM, OTHER_FINGERS), (OTHER_FINGERS, target)}
     for low in range(OWNERS):
         for high in range(low, OWNERS):
             expected = low == high or BEAD in (low, high) or (low, high) in wanted
