@@ -25,7 +25,7 @@ from .state import State
 from .task import TaskDescription, TaskFurniture, TaskObject
 from .things import TABLE_HEIGHT, Things
 
-VIEW = View(look_at=(0.0, -0.04, 1.13), distance=1.5, azimuth=38.0, elevation=-20.0)
+VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
 READY = {"Panda": (-0.435, 0.580, -0.670, -1.869, 1.843, 1.350, 0.048)}
 """Start joints [rad]: the hand level before the stand, fingers above each other; other robots start at home."""
 LIFT, WAY_IN = 0.15, 0.22
@@ -247,7 +247,7 @@ class ShelveEnv(OneDemoEnv):
         return [Order("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
 
     def _ghosts(self) -> list[Ghost]:
-        return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose]
+        return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose[self._progress.placed :]]
 
     def _goals(self) -> tuple[np.ndarray, float]:
         return self._goal_pose.copy(), self._progress.motion_index
