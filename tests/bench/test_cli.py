@@ -9,13 +9,16 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from onedemo.bench import perf
 from onedemo.bench.cli import main
+from onedemo.bench.perf_tasks import step_line
 from onedemo.bench.records import read_records
+from onedemo.bench.tasks import TASKS
 from onedemo.configs.shipped import shipped_demonstration
 from onedemo.planner.demo_io import load_demonstration, save_demonstration
 
@@ -209,7 +212,8 @@ def test_perf_runs_what_matches_and_nothing_else(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(perf, "GROUPS", lines)
     file = tmp_path / "rows.json"
     assert called(monkeypatch, capsys, "perf", "--only", "stack step*", "--json", file)[0] == 0
-    assert ran == [perf.STEP, perf.PEER_STEP]
+    assert ran == [name for name in lines["step"] if "stack step" in name.lower()]
+    assert step_line("stack") in ran and perf.PEER_STEP in ran
     rows = json.loads(file.read_text())["rows"]
     assert [(row["name"], row["value"], row["goal"], row["ok"]) for row in rows] == [(n, 1.0, 2.0, True) for n in ran]
     ran.clear()
@@ -222,15 +226,16 @@ def test_a_file_that_cannot_be_written_after_all_is_one_line(monkeypatch, capsys
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(perf, "write_json", full)
-    monkeypatch.setattr(perf, "GROUPS", {"step": {perf.STEP: lambda: perf.row(perf.STEP, 1.0, "ratio", 2.0)}})
+    monkeypatch.setattr(perf, "GROUPS", {"step": {"a line": lambda: perf.row("a line", 1.0, "ratio", 2.0)}})
     code, _, err = called(monkeypatch, capsys, "perf", "--json", tmp_path / "x.json")
     assert code == 2
     assert err.strip().endswith("x.json cannot be written: No space left on device")
 
 
-def test_the_two_scenes_of_the_step_line_go_the_same_way():
+@pytest.mark.parametrize("task", sorted(TASKS))
+def test_the_two_scenes_of_a_step_line_go_the_same_way(task):
     """The line itself fails if they do not; its value depends on the machine."""
-    assert perf.GROUPS["step"][perf.STEP]().value > 0.5
+    assert perf.GROUPS["step"][step_line(task)]().value > 0.5
 
 
 def test_a_run_leaves_everything_and_goes_on_where_it_stopped(tmp_path):
@@ -257,7 +262,9 @@ def test_a_run_leaves_everything_and_goes_on_where_it_stopped(tmp_path):
 
 def test_control_c_keeps_finished_episodes(tmp_path):
     run = [sys.executable, "-c", ENTRY, "run", "stack", "episodes=500", "video=false", "-o", str(tmp_path)]
-    process = subprocess.Popen(run, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    # what a shell starts in the background ignores SIGINT, and so would this
+    heard = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    process = subprocess.Popen(run, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, preexec_fn=heard)
     deadline = time.monotonic() + 120
     while not any(file.stat().st_size for file in tmp_path.glob("*/episodes.jsonl")):
         assert process.poll() is None

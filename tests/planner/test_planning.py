@@ -351,7 +351,8 @@ def test_what_is_too_close_for_a_detour_is_named():
     planner = Planner(arm, body, PlanSettings(search=None))
     failed = planner.plan(demonstrated(), home, goal, [wall, near])
     assert failed.why == "no room for a detour at the goal: fingers is 15.0 mm from shelf, which must be 20.0"
-    assert planner.plan(demonstrated(), home, goal, [wall, shelf]).reason in ("no escape found", "node limit reached")
+    farther = planner.plan(demonstrated(), home, goal, [wall, shelf])
+    assert not farther.success and "no room" not in farther.why
 
 
 def test_a_tree_that_is_stopped_says_so():
