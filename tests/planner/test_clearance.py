@@ -267,6 +267,30 @@ def test_no_point_of_a_core_goes_farther_than_its_bound(seed, exponent):
         assert (bound <= 3 * arm.dof * ways + 1e-3).all()
 
 
+def test_the_bound_grows_with_a_lever_that_a_later_joint_lengthens():
+    """An arm folded so that its end is on the first axis: what it sweeps there is not seen at the start."""
+    for seed in range(8):
+        arm = random_arm(seed, 2, 0.0)
+        g = work_of(arm, Body(np.array([[1, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.02]]), ("ball",)), [])
+
+        def farthest_way(q, step, g=g):
+            place_capsules(g, q, WORLD)
+            bound_motion(g, WORLD, step)
+            bound, places = g[WORLD, W_REACH], []
+            for s in np.linspace(0, 1, 200):
+                place_capsules(g, q + s * step, NEXT)
+                places.append(g[NEXT, :3].copy())
+            return bound, np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+
+        turns = [np.array([0.0, turn]) for turn in np.linspace(-3, 3, 121)]
+        folded = min(turns, key=lambda q: farthest_way(q, np.array([0.1, 0.0]))[1])
+        step = np.array([1.5, 1.5])
+        alone = sum(farthest_way(folded, part)[0] for part in (step * [1, 0], step * [0, 1]))
+        bound, way = farthest_way(folded, step)
+        assert way <= bound + 1e-12
+        assert bound > alone + 0.1
+
+
 def test_the_bound_of_one_joint_is_its_arc():
     arm = random_arm(1, 1, 0.0)
     body = Body(np.array([[0, 0.3, 0.4, 0.1, 0.3, 0.4, 0.7, 0.02]]), ("rod",))
