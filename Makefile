@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 FOLDERS := envs planner baselines configs bench tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lint types check perf soak study bodies beads clean
+.PHONY: help demo test slow lint types check perf soak study docs bodies beads clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -56,6 +56,9 @@ soak: $(VENV)/.developed ## a million steps that try to break the guard; the res
 study: $(VENV)/.developed ## plan in a thousand random scenes, judged; and change each setting: bench/scenes.json, ablation.json
 	@$(BIN)/python tests/scene_study.py --count 150 --output bench/scenes.json
 	@$(BIN)/python tests/repet_ablation.py --count 20 --output bench/ablation.json
+
+docs: $(VENV)/.developed ## the page and the clip of every task: docs/tasks
+	@$(BIN)/onedemo tasks --write docs/tasks --clips
 
 bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
 	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"
