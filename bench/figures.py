@@ -55,7 +55,7 @@ def _boxes(seen: Showcase) -> list[tuple[np.ndarray, str, str, float]]:
     """Poses (n, 7), legend entry, color and opacity of the two groups of boxes."""
     return [
         (seen.goals, "where they must end", GOAL_FACE, 0.45),
-        (seen.start, "blocks at the start", START_FACE, 0.95),
+        (seen.start, "objects at the start", START_FACE, 0.95),
     ]
 
 
