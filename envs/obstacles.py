@@ -136,6 +136,8 @@ class ObstacleSlots:
     def observed(self, seconds: float) -> dict[str, np.ndarray]:
         """The entries of the observation, in new arrays."""
         entries = self._blank()
+        if not self.intruders:
+            return entries
         for slot in np.flatnonzero(self.active):
             each = self.intruders[slot]
             entries["obstacle_active"][slot] = 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from typing import NamedTuple
 
 import mujoco
@@ -105,6 +106,8 @@ class Simulation:
 
     def nearest_obstacle(self) -> float:
         """Smallest distance [m] of the robot, or of what it holds, to an obstacle in this episode; infinite if none."""
+        if not self.obstacles.intruders:
+            return math.inf
         return self._near.smallest(self.obstacles.active, self._touching)
 
     def step(self, action: np.ndarray, full: np.ndarray, bound: float, substeps: int) -> int:
