@@ -20,6 +20,7 @@ from .pour_geometry import BACK, BEADS, GLASSES, SOURCE, STANDS, TARGET, TILTED,
 from .pour_layouts import GAP, LONG_GAP, PLACES, RANGES, checked_stands, pour_layout
 from .pour_rules import PourProgress
 from .render import View
+from .robots import check_fit
 from .rooms import arm_room
 from .sim import Start
 from .spaces import observation_space
@@ -137,6 +138,7 @@ class PourEnv(OneDemoEnv):
     ):
         if not isinstance(pregrasped, bool):
             raise BadOption("pregrasped", f"{pregrasped!r} is neither True nor False")
+        check_fit(robot, ("Panda",), "Pour")
         super().__init__(
             robot=robot,
             things=Things(GLASSES, STANDS, BEADS),
@@ -150,8 +152,6 @@ class PourEnv(OneDemoEnv):
         )
         self.pregrasped = pregrasped
         widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        if widths[0] < 2.0 * GLASSES[SOURCE].radius:
-            raise BadOption("robot", f"the gripper of {robot} opens {1e3 * widths[0]:.0f} mm; the source is wider")
         self._nominal = checked_stands(PLACES if stands is None else stands, self._axis)
         self._ready = checked_joints(READY if ready is None else ready, self.arms)
         more = {"furniture_pose": space.pose_box(2), "bead_fraction": space.box(0.0, 1.0, (3,))}

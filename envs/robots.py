@@ -125,3 +125,15 @@ def robot_named(name: object) -> Robot:
     if not isinstance(name, str) or name not in ROBOTS:
         raise UnknownName("robot", name, ROBOTS)
     return ROBOTS[name]
+
+
+def check_fit(robot: object, fit: tuple[str, ...], task: str) -> None:
+    """Refuse a robot that a task's places were not made for.
+
+    Raises:
+        UnknownName: no such robot.
+        BadOption: it is known, but does not fit.
+    """
+    robot_named(robot)
+    if robot not in fit:
+        raise BadOption("robot", f"{robot} cannot do {task}, whose places are made for: {', '.join(fit)}")

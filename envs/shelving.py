@@ -14,6 +14,7 @@ from .bodies import robot_body
 from .options import checked_joints
 from .placement import Leg, Order
 from .render import Ghost, View
+from .robots import check_fit
 from .rooms import arm_room
 from .shelf_layouts import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
 from .shelf_options import OPTIONS, given_layout
@@ -144,6 +145,7 @@ class ShelveEnv(OneDemoEnv):
             raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
         self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
         objects, furniture = books(n_books), (cupboard(), *stand())
+        check_fit(robot, ("Panda",), "Shelve")
         super().__init__(
             robot=robot,
             things=Things(objects, furniture),

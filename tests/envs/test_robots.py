@@ -198,3 +198,10 @@ def test_what_cannot_be_is_refused_in_a_line():
         gym.make("onedemo/Stack-v0", robot="R2D2")
     with pytest.raises(BadOption, match="Panda has one arm"):
         gym.make("onedemo/BimanualPour-v0", robot="Panda")
+
+
+@pytest.mark.parametrize("task", ["Pour", "Shelve"])
+@pytest.mark.parametrize("robot", ["Baxter", "UR5e"])
+def test_a_robot_that_a_task_is_not_made_for_is_refused_in_one_line(task, robot):
+    with pytest.raises(BadOption, match=f"'robot': {robot} cannot do {task}, whose places are made for: Panda"):
+        gym.make(f"onedemo/{task}-v0", robot=robot)
