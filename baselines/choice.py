@@ -18,10 +18,10 @@ from ..planner.body import Body
 from ..planner.errors import PlanFailed
 from ..planner.foresight import moves
 from ..planner.planning import Planner
-from ..planner.plans import Plan, PlanSettings
+from ..planner.plans import Onward, Plan, PlanSettings
 from ..planner.pose import Pose, PosePath
 from ..planner.shapes import Obstacle
-from ..planner.tsia import departure, final_path, screw_path
+from ..planner.tsia import departure, final_path, imitated_path, screw_path
 
 
 class Leg(NamedTuple):
@@ -35,6 +35,7 @@ class Leg(NamedTuple):
         obstacles: what is around; what moves is left to the moment.
         allowed: contacts that are wanted, see `Planner.plan`.
         leaving: the segment whose beginning is imitated when leaving the start; None: none, blend at once.
+        strictly: along the path or not at all, see `ReactivePlanner.go`.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Leg(NamedTuple):
     obstacles: tuple[Obstacle, ...]
     allowed: tuple[tuple[str, str], ...] = ()
     leaving: PosePath | None = None
+    strictly: bool = False
 
 
 class Choice(NamedTuple):
@@ -85,9 +87,12 @@ class Choice(NamedTuple):
         return path if self.departure is None else self.departure.joined(path)
 
     @property
-    def onward(self) -> PosePath | None:
-        """The next leg's path, so that the posture at the end of this one suits it."""
-        return None if self.then is None else self.then.path
+    def onward(self) -> Onward | None:
+        """The next leg, so that the posture at the end of this one suits it."""
+        if self.then is None:
+            return None
+        asked = self.then.plan.asked
+        return Onward(self.then.path, asked.allowed, must=not asked.settings.avoid)
 
 
 def choose(
@@ -143,18 +148,26 @@ def _choices(
     then: Callable[[int], Leg] | None,
 ) -> Iterator[Choice]:
     """A choice for every goal, and for every goal of the next leg from there the best."""
+    settings = replace(settings, avoid=False, motion=replace(settings.motion, guide=0.0)) if leg.strictly else settings
     planner, away = Planner(arm, leg.body, settings), way_out(arm, settings, q, leg)
     for index, goal in enumerate(leg.goals):
         following = None if then is None else then(index)
-        onward = None
-        if settings.search is not None and following is not None and following.leaving is not None:
-            onward = departure(following.leaving, goal, settings.motion.departure)
+        onward = None if following is None else _beginning(following, goal, settings)
         plan = planner.plan(leg.demonstrated, q, goal, _still(leg), allowed=leg.allowed, leaving=away, onward=onward)
         choice = Choice(index, plan, away)
         if plan.success and following is not None:
             best = max(_choices(arm, next_settings, next_settings, plan.joints[-1], following, None), key=_rank)
             choice = choice._replace(then=best if best.plan.success else None)
         yield choice
+
+
+def _beginning(leg: Leg, start: Pose, settings: PlanSettings) -> Onward | None:
+    """What is known of the way of a leg before its goal is chosen."""
+    if leg.strictly:
+        return Onward(imitated_path(leg.demonstrated, leg.goals[0]), leg.allowed, must=True)
+    if leg.leaving is None or settings.search is None:
+        return None
+    return Onward(departure(leg.leaving, start, settings.motion.departure))
 
 
 def _rank(choice: Choice) -> tuple[bool, bool, float, float, int]:

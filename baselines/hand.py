@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.command import DONE, FAILED, ReactiveSettings
 from ..planner.errors import PlanFailed
+from ..planner.plans import Onward
 from ..planner.pose import Pose, PosePath
 from ..planner.reactive import ReactivePlanner
 from ..planner.shapes import Shape
@@ -19,7 +22,22 @@ from .policy import Observation
 from .surroundings import Surroundings
 
 OPEN, CLOSE = -1.0, 1.0
+LOST = 0.03
+"""Distance [m] of an object from where it was grasped in the hand beyond which it was dropped."""
+SLIP, TURN = 0.004, 0.05
+"""Distance [m] and angle [rad] by which what is in the hand must slip before it is guarded where it is now."""
+GLANCE = 5
+"""Ticks between looks at what is in the hand."""
 Actions = Iterator[np.ndarray]
+
+
+class _Held(NamedTuple):
+    """What is in the hand: index and shape, `tcp_from_object` when it was grasped, and as it is guarded."""
+
+    index: int
+    shape: Shape
+    grasped: Pose
+    guarded: Pose
 
 
 class Hand:
@@ -47,6 +65,7 @@ class Hand:
         self.observation, self.surroundings = observation, surroundings
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
+        self._held: _Held | None = None
         self._planner = ReactivePlanner(arm, body, settings)
 
     @property
@@ -63,14 +82,19 @@ class Hand:
         return Pose.from_vector(self.observation["goal_pose"][index])
 
     def slow_down(self, pace: float) -> None:
-        """From now on use a share of the joints' speed limits; the hand must be empty, and on no path."""
+        """From now on use a share of the joints' speed limits; the hand must be on no path."""
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
-        self._planner = ReactivePlanner(self.arm, self.empty, self._planner.settings)
+        self._planner = ReactivePlanner(self.arm, self._planner.body, self._planner.settings)
 
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
         """From now on object `index` is part of the arm, and no longer around it."""
+        self._held = _Held(index, shape, tcp_from_object, tcp_from_object)
         self.surroundings.without(index)
         self._planner.hold(self.body_with(shape, tcp_from_object))
+
+    def tcp_from(self, index: int) -> Pose:
+        """Pose of an object in the hand as observed."""
+        return self.measured_tcp.inverse() @ self.object_pose(index)
 
     def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
         """The body with an object in the hand, as "held"."""
@@ -78,6 +102,7 @@ class Hand:
 
     def release(self) -> None:
         """From now on the hand is empty."""
+        self._held = None
         self.surroundings.without(None)
         self._planner.hold(self.empty)
 
@@ -95,28 +120,48 @@ class Hand:
 
     def go(self, choice: Choice) -> Actions:
         """Do what was chosen."""
-        for path, loosely in choice.parts:
-            yield from self.follow(path, loosely=loosely, onward=choice.onward)
+        *before, (last, loosely) = choice.parts
+        for path, roughly in before:
+            yield from self.follow(path, loosely=roughly)
+        yield from self.follow(last, loosely=loosely, onward=choice.onward)
 
-    def follow(self, path: PosePath, *, loosely: bool = False, onward: PosePath | None = None) -> Actions:
+    def follow(
+        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+    ) -> Actions:
         """Follow a path to its end, round what is in the way.
 
         Args:
             path: of the tcp.
             loosely: until it is within reach of the end.
-            onward: the path that comes next: where there is a choice, it ends in a posture that suits it.
+            onward: what comes next: where there is a choice, the path ends in a posture that suits it.
+            strictly: along the path or not at all.
 
         Raises:
-            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience.
+            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", what was in the
+                hand is not.
         """
-        self._planner.go(path, loosely=loosely, onward=onward)
-        while True:
+        self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)
+        for tick in count():
+            if tick % GLANCE == 0:
+                self._mind_held()
             command = self._planned()
             if command.state == DONE:
                 return
             if command.state == FAILED:
                 raise PlanFailed(command.reason, command.detail or self._stall_detail())
             yield self._action(command.velocity)
+
+    def _mind_held(self) -> None:
+        """Guard what is in the hand where it has slipped to."""
+        if self._held is None:
+            return
+        held, now = self._held, self.tcp_from(self._held.index)
+        if held.grasped.gap(now)[0] > LOST:
+            raise PlanFailed("dropped", f"object {held.index} is not where it was in the hand")
+        distance, angle = held.guarded.gap(now)
+        if distance > SLIP or angle > TURN:
+            self._held = held._replace(guarded=now)
+            self._planner.hold(self.body_with(held.shape, now))
 
     def wait(self, seconds: float) -> Actions:
         """Stand still with the gripper as it is."""

@@ -24,7 +24,7 @@ from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.shapes import Obstacle, pack
 from ..planner.tsia import departure, imitated_path, screw_path
-from .hand import CLOSE, Hand
+from .hand import CLOSE, LOST, Hand
 from .policy import LabeledPath
 from .pour_goals import PourGoals
 
@@ -41,8 +41,6 @@ NEAR = 0.02
 """Distance [m] to the target from which on the source comes close to it on purpose."""
 LIFT = 0.08
 """Height [m] of a lift straight up, where none is shown."""
-LOST = 0.03
-"""Distance [m] of the source from where it should be in the hand beyond which it was dropped."""
 CHANCES = 3
 """How often another way is looked for where the carry is blocked."""
 

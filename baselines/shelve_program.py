@@ -19,17 +19,17 @@ from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.tsia import imitated_path, screw_path
 from .choice import Choice, Leg
-from .hand import CLOSE, OPEN, Hand
+from .hand import CLOSE, LOST, OPEN, Hand
 from .policy import LabeledPath
 
 if TYPE_CHECKING:
     from .screw_policy import ScrewSettings
 
 CUPBOARD, STAND = "cupboard", "stand"
-LOST = 0.03
-"""Distance [m] of a book from where it should be in the hand beyond which it was dropped."""
 BETWEEN = 0.07
 """Way back [m] after which the fingers are no longer between books."""
+PACE = 0.5
+"""Share of the joints' speed limits that is used in the shelf: an arm that is faster goes too far when it stops."""
 PATIENCE = 5.0
 """Seconds that a book is waited for."""
 
@@ -110,10 +110,12 @@ class ShelveProgram:
         held = self._held(k)
         insertion = self._insertion(k, held)
         leg = self._leg("carry", k, insertion[0], held=held)
-        choice = self.hand.choose(leg, lambda _: self._leg("insert", k, insertion[-1], touching, held))
+        into = self._leg("insert", k, insertion[-1], touching, held)._replace(strictly=True)
+        choice = self.hand.choose(leg, lambda _: into)
         yield from self._done(choice, leg)
         self.hand.allow(touching)
-        yield from self.hand.follow(self._insertion(k, self._held(k)))
+        self.hand.slow_down(PACE)
+        yield from self.hand.follow(self._insertion(k, self._held(k)), strictly=True)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(self._release, self.settings.open)
         self.hand.release()
@@ -123,7 +125,8 @@ class ShelveProgram:
         """Straight back: from between the books first, where a detour would push them over."""
         path = self._from_here("retreat")
         free = int(np.argmax(np.linalg.norm(path.positions - path.positions[0], axis=1) > BETWEEN))
-        yield from self.hand.follow(path[: free + 1], loosely=True)
+        yield from self.hand.follow(path[: free + 1], loosely=True, strictly=True)
+        self.hand.slow_down(1.0)
         self.hand.allow(())
         yield from self.hand.follow(path[free:], loosely=True)
 

@@ -17,15 +17,12 @@ from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
 from .choice import Choice, Leg
-from .hand import CLOSE, OPEN, Hand
+from .hand import CLOSE, LOST, OPEN, Hand
 from .policy import LabeledPath
 from .surroundings import TABLE
 
 if TYPE_CHECKING:
     from .screw_policy import ScrewSettings
-
-LOST = 0.03
-"""Distance [m] of the object from where it should be in the hand beyond which it was dropped."""
 
 
 def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:

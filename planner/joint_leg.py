@@ -23,21 +23,27 @@ if TYPE_CHECKING:
     from .plans import PlanSettings
 
 
+FEWER, FEWEST = 4, 100
+"""Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
+RAMP = 0.3
+"""Seconds from rest to full speed."""
+
+
 @dataclass(frozen=True, slots=True)
 class JointSearchSettings:
     """The search in joint space.
 
     Attributes:
         step: longest edge [rad].
-        iterations: most samples of one search.
+        iterations: most samples of one search in the last round.
         nodes: most nodes of one of its two trees.
         seeds: starts of the inverse kinematics per pose.
         targets: poses of the demonstrated path's tail that are aimed at, from the guiding pose to the goal.
-        postures: most postures that are searched for, the most promising first.
+        postures: most postures that are searched for, the most promising first; the shortest way is taken.
         rounds: how often, each time with twice as many seeds.
         margin: smallest joint margin [rad] that a posture should have, so that the next leg has somewhere to go.
         late: what coming back to the demonstrated path only at its end costs, in radians of way.
-        shortcuts: tries to leave out points of what was found.
+        shortcuts: straight lines that are tried in place of stretches of what was found.
         speed: of the largest joint speed, on the way found.
     """
 
@@ -50,7 +56,7 @@ class JointSearchSettings:
     rounds: int = 3
     margin: float = 0.15
     late: float = 3.0
-    shortcuts: int = 60
+    shortcuts: int = 300
     speed: float = 0.4
 
     def __post_init__(self):
@@ -80,6 +86,24 @@ class JointLeg(NamedTuple):
     margin: float
 
 
+class After(NamedTuple):
+    """What comes after a leg.
+
+    Attributes:
+        scene: the arm among the obstacles, with the contacts that are wanted then.
+        path: of the tcp.
+        must: it must be possible from the end of the leg.
+    """
+
+    scene: SceneWork
+    path: PosePath
+    must: bool
+
+    def can_be_done(self, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
+        """True if it can be followed from joints q (dof,)."""
+        return _followed(self.scene, work, self.path, q, settings)[0] is not None
+
+
 class _Posture(NamedTuple):
     cost: float
     order: int
@@ -97,7 +121,7 @@ def joint_leg(
     goal: Pose,
     q: np.ndarray,
     settings: PlanSettings,
-    onward: PosePath | None,
+    after: After | None,
     seed: int,
 ) -> JointLeg | None:
     """Search a way from joints q (dof,) to the goal; None if none was found.
@@ -110,7 +134,7 @@ def joint_leg(
         goal: where the tcp must end.
         q: (dof,) joints at the start.
         settings: see `PlanSettings`.
-        onward: the next leg's path, or None.
+        after: what comes next, or None.
         seed: of all random choices.
     """
     search = settings.search
@@ -119,20 +143,35 @@ def joint_leg(
     state = np.array([float(seed % 2147483646) + 1.0])
     trees, parents = np.empty((2, search.nodes, arm.dof)), np.empty((2, search.nodes))
     out = np.empty((2 * search.nodes, arm.dof))
+    ends = np.empty((2, arm.dof))
     for turn in range(search.rounds):
-        seeds = search.seeds * 2**turn
-        found = _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, seeds)
+        later = search.rounds - 1 - turn
+        iterations = max(search.iterations // FEWER**later, min(FEWEST, search.iterations))
+        found = _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, search.seeds * 2**turn)
+        best, least = None, math.inf
         for posture in sorted(found)[: search.postures]:
-            count = connect(scene.robot, q, posture.q, trees, parents, search.step, search.iterations, state, out)
+            if posture.cost >= least:
+                break  # no way is shorter than the straight line
+            count = connect(scene.robot, q, posture.q, trees, parents, search.step, iterations, state, out)
             if count:
-                count = shortcut(scene.robot, out, count, search.shortcuts, state)
-                way = _timed(out[:count], search.speed * arm.velocity_limits * settings.motion.dt)
-                joints = np.vstack([way[:-1], posture.tail])
-                return JointLeg(joints, posture.path, posture.guide, min(arm.margin(row) for row in joints))
+                count = shortcut(scene.robot, out, count, search.shortcuts, state, ends)
+                cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
+                if cost < least:
+                    best, least = (out[:count].copy(), posture), cost
+        if best is not None:
+            points, posture = best
+            way = _timed(points, search.speed * arm.velocity_limits, settings.motion.dt)
+            joints = np.vstack([way[:-1], posture.tail])
+            return JointLeg(joints, posture.path, posture.guide, min(arm.margin(row) for row in joints))
     return None
 
 
-def _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, seeds) -> list[_Posture]:
+def _length(points: np.ndarray) -> float:
+    """Of a joint path (n, dof), by the joint that moves most on each line [rad]."""
+    return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
+
+
+def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, seeds) -> list[_Posture]:
     """Clear postures on the demonstrated path from which the rest of it can be followed, with what they cost."""
     search, found = settings.search, []
     imitated = imitated_path(demonstrated, goal)
@@ -151,7 +190,9 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, se
                 continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
             cost += search.late * (index - first) / max(last - first, 1)
-            if onward is not None and _followed(scene, work, onward, tail[-1], settings)[0] is None:
+            if after is not None and not after.can_be_done(work, tail[-1], settings):
+                if after.must:
+                    continue
                 cost += 5.0
             found.append(_Posture(cost, len(found), solution, tail, path, index))
     return found
@@ -167,10 +208,23 @@ def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]
     return (trace[: last + 1].copy() if status == ARRIVED else None), margin
 
 
-def _timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Points on the straight lines between joint points (n, dof), no joint moving more than its step (dof,)."""
+def _timed(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:
+    """Points at every tick of `dt` [s] on the straight lines between joint points (n, dof), each from rest to rest.
+
+    A corner that is taken at speed throws what is in the hand about.
+
+    Args:
+        points: (n, dof) joints.
+        speeds: (dof,) largest speeds of the joints.
+        dt: seconds per tick.
+    """
     rows = [points[:1]]
     for start, end in pairwise(points):
-        count = max(1, math.ceil((np.abs(end - start) / step).max()))
-        rows.append(start + np.arange(1, count + 1)[:, None] / count * (end - start))
+        least = max(float((np.abs(end - start) / speeds).max()), dt)  # seconds at full speed
+        ramp = min(RAMP, math.sqrt(least * RAMP))
+        total = max(least, ramp) + ramp
+        t = np.linspace(0.0, total, math.ceil(total / dt) + 1)[1:]
+        begun, left = t * t / (2.0 * least * RAMP), (total - t) ** 2 / (2.0 * least * RAMP)
+        part = np.where(t < ramp, begun, np.where(total - t < ramp, 1.0 - left, (t - 0.5 * ramp) / least))
+        rows.append(start + part[:, None] * (end - start))
     return np.vstack(rows)

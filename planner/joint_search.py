@@ -199,17 +199,51 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
     return 0
 
 
+@inner
+def _on_edge(path, k, s, out):
+    """The point at fraction s between points k and k + 1 of a path."""
+    for d in range(path.shape[1]):
+        out[d] = path[k, d] + s * (path[k + 1, d] - path[k, d])
+
+
+@inner
+def _moved(path, first, count, to):
+    """Move the points from `first` to the end so that they begin at row `to`; the new number of points."""
+    n = count - first
+    for m in range(n):
+        k = m if to < first else n - 1 - m
+        for d in range(path.shape[1]):
+            path[to + k, d] = path[first + k, d]
+    return to + n
+
+
 @kernel
-def shortcut(g, path, count, tries, state):
-    """Leave out points of a joint path (count, n) that can be jumped over clear, in place; the new number."""
+def shortcut(g, path, count, tries, state, ends):
+    """Put clear straight lines in place of stretches of a joint path (count, n), from anywhere to anywhere on it.
+
+    Args:
+        g: the robot among obstacles, see `robot_work`.
+        path: (m, n), the first `count` rows are the path; changed.
+        count: number of its points.
+        tries: lines to try.
+        state: (1,) of the random numbers.
+        ends: (2, n) scratch.
+
+    Returns:
+        The new number of points.
+    """
     for _ in range(tries):
-        if count < 3:
+        if count < 3 or count + 1 >= len(path):
             break
-        i = int(random_number(state) * (count - 2))
-        j = i + 2 + int(random_number(state) * (count - 2 - i))
-        if joint_edge_is_clear(g, path[i], path[j]):
-            for k in range(j, count):
-                for d in range(path.shape[1]):
-                    path[i + 1 + k - j, d] = path[k, d]
-            count -= j - i - 1
+        s, t = random_number(state) * (count - 1), random_number(state) * (count - 1)
+        s, t = min(s, t), max(s, t)
+        i, j = int(s), int(t)
+        if i == j:
+            continue
+        _on_edge(path, i, s - i, ends[0])
+        _on_edge(path, j, t - j, ends[1])
+        if joint_edge_is_clear(g, ends[0], ends[1]):
+            count = _moved(path, j + 1, count, i + 3)
+            for d in range(path.shape[1]):
+                path[i + 1, d], path[i + 2, d] = ends[0, d], ends[1, d]
     return count

@@ -23,9 +23,9 @@ from .chain import FRAME, forward_into
 from .errors import BadOption
 from .escape import ESCAPED, FREE, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
 from .escape_tree import CANDIDATES, ROUNDS, WIDEST
-from .joint_leg import joint_leg
+from .joint_leg import After, joint_leg
 from .leg import CHANGED, DETOURS, FOLLOWED, FULL, GUIDE, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
-from .plans import WHY, Asked, Plan, PlanSettings, Problem
+from .plans import WHY, Asked, Onward, Plan, PlanSettings, Problem
 from .pose import Pose, PosePath
 from .pursuit import ARRIVED
 from .repet import Corner
@@ -52,12 +52,13 @@ class Attempt(NamedTuple):
 
 
 class _Run(NamedTuple):
-    """One call of `Planner.plan`: what was asked, the arm among the obstacles, the demonstration, the joints."""
+    """One call of `Planner.plan`: what was asked, the arm among obstacles, demonstration, joints, what comes next."""
 
     asked: Asked
     scene: SceneWork
     demonstrated: PosePath
     q: np.ndarray
+    after: After | None
 
 
 class Planner:
@@ -91,7 +92,7 @@ class Planner:
         *,
         allowed: Sequence[tuple[str, str]] = (),
         leaving: PosePath | None = None,
-        onward: PosePath | None = None,
+        onward: Onward | None = None,
         seed: int = 0,
     ) -> Plan:
         """Plan a leg.
@@ -103,20 +104,20 @@ class Planner:
             obstacles: as they are now; they are taken to stand still.
             allowed: pairs of names (part of the body or held object, obstacle) that may touch.
             leaving: how to leave, from the pose at `start` on; None: blend at once.
-            onward: the next leg's path: in a search, postures from which it can be followed are preferred.
+            onward: what comes next; see `Onward`.
             seed: of all random choices; the same seed gives the same plan.
         """
         begun = time.perf_counter()
         q = self.arm.checked(start)
         scene = SceneWork(self._layout, checked_obstacles(obstacles), self.settings.repet.distance, allowed)
         asked = Asked(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings)
-        run = _Run(asked, scene, demonstrated, q)
+        run = _Run(asked, scene, demonstrated, q, self._after(scene, asked, onward))
         reason, detail = self._unfit(scene, q, goal)
         if reason:
             return self._failed(run, reason, detail)
         best, tries = self._followed(run, leaving.dqs.copy() if leaving is not None else self._pose(q)[None], seed)
-        if not best.success or best.end_margin < self.settings.end_margin:
-            best = self._searched(run, best, onward, seed)
+        if not best.success or best.end_margin < self.settings.end_margin or not best.goes_on:
+            best = self._searched(run, best, seed)
         return best._replace(tries=tries, seconds=time.perf_counter() - begun)
 
     def _followed(self, run: _Run, lead: np.ndarray, seed: int) -> tuple[Plan, int]:
@@ -132,6 +133,7 @@ class Planner:
             if pursuit == ARRIVED:
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
+                found = found._replace(goes_on=self._goes_on(run, found.joints[-1]))
                 if self._is_good(found) or self.settings.effort == 0:
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
@@ -143,16 +145,16 @@ class Planner:
             best = self._failed(run, *failed, tried=True)
         return best, len(escapes)
 
-    def _searched(self, run: _Run, best: Plan, onward: PosePath | None, seed: int) -> Plan:
+    def _searched(self, run: _Run, best: Plan, seed: int) -> Plan:
         """The better of a plan, which may be none, and one of a search in joint space."""
         settings = self.settings
         if settings.search is None or not settings.avoid or (best.success and settings.effort == 0):
             return best
-        if best.success:
+        if best.success and best.goes_on:
             rounds = min(settings.search.rounds, settings.effort)
             settings = replace(settings, search=replace(settings.search, rounds=rounds))
         found = joint_leg(
-            self.arm, run.scene, self._work, run.demonstrated, run.asked.goal, run.q, settings, onward, seed
+            self.arm, run.scene, self._work, run.demonstrated, run.asked.goal, run.q, settings, run.after, seed
         )
         if found is None:
             return best
@@ -165,7 +167,19 @@ class Planner:
         return _better(best, plan) if best.success else plan
 
     def _is_good(self, plan: Plan) -> bool:
-        return plan.kept >= self.settings.keep and plan.end_margin >= self.settings.end_margin
+        settings = self.settings
+        return plan.kept >= settings.keep and plan.end_margin >= settings.end_margin and plan.goes_on
+
+    def _after(self, scene: SceneWork, asked: Asked, onward: Onward | None) -> After | None:
+        if onward is None:
+            return None
+        if onward.must:
+            scene = SceneWork(self._layout, asked.obstacles, self.settings.repet.distance, onward.allowed)
+        return After(scene, onward.path, onward.must)
+
+    def _goes_on(self, run: _Run, q: np.ndarray) -> bool:
+        """True if what must come next can be done from joints q."""
+        return run.after is None or not run.after.must or run.after.can_be_done(self._work, q, self.settings)
 
     def _pose(self, q: np.ndarray) -> np.ndarray:
         out = np.empty(8)
@@ -279,8 +293,8 @@ def _kept(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
 
 
 def _better(one: Plan, other: Plan) -> Plan:
-    """The plan that keeps more of the demonstration; of those that keep as much, the one that ends freer."""
-    return max((one, other), key=lambda plan: (round(plan.kept, 1), plan.end_margin))
+    """The plan that can go on, that keeps more of the demonstration; of those that keep as much, the freer end."""
+    return max((one, other), key=lambda plan: (plan.goes_on, round(plan.kept, 1), plan.end_margin))
 
 
 def plan(

@@ -103,6 +103,20 @@ class PlanSettings:
             raise BadOption("repet.distance", reason)
 
 
+class Onward(NamedTuple):
+    """What comes after a leg, with the same body.
+
+    Attributes:
+        path: of the tcp.
+        allowed: contacts that are wanted then, see `Planner.plan`.
+        must: a leg from whose end it cannot be followed is only a fallback; else such ends are preferred in a search.
+    """
+
+    path: PosePath
+    allowed: tuple[tuple[str, str], ...] = ()
+    must: bool = False
+
+
 class Asked(NamedTuple):
     """What a plan is the answer to, besides the path.
 
@@ -150,6 +164,7 @@ class Plan(NamedTuple):
         kept: share of the imitated path behind the wanted guiding pose that is followed, by screw length; above 1
             where the way leads along it earlier.
         refined: what has been done to it since: "smooth", "timed".
+        goes_on: what must come next can be followed from its end.
     """
 
     joints: np.ndarray
@@ -169,6 +184,7 @@ class Plan(NamedTuple):
     guide: int = 0
     kept: float = 1.0
     refined: tuple[str, ...] = ()
+    goes_on: bool = True
 
     @property
     def success(self) -> bool:

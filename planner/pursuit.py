@@ -23,8 +23,8 @@ from .jit import kernel
 from .pose import METERS_PER_RADIAN, PosePath
 from .workspace import LIMITS, PURSUIT, bound, pose_and_jacobian
 
-PROGRESS = 1e-4
-"""Screw length [m] that counts as progress."""
+PROGRESS = 2e-3
+"""Screw length [m] that counts as progress: what creeps along an obstacle by less in the whole patience has stalled."""
 FOLLOWING, ARRIVED, STALLED = 0, 1, 2
 INDEX, SIGN, BEST, WAITED = 0, 1, 2, 3
 

@@ -20,7 +20,7 @@ from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Comman
 from .foresight import HAIR, Ahead, Foresight, moves, nearest, same_scene, swept, windows
 from .guarded import guarded_tick
 from .planning import Planner
-from .plans import Plan
+from .plans import Onward, Plan
 from .pose import Pose, PosePath
 from .pursuit import ARRIVED, INDEX, WAITED
 from .repet import MAX_OBSTACLES
@@ -58,7 +58,7 @@ class ReactivePlanner:
         self._joints: np.ndarray | None = None
         self._nominal: PosePath | None = None
         self._path: PosePath | None = None
-        self._memory = np.zeros(4)
+        self._memory, self._strictly = np.zeros(4), False
         self._planner = Planner(arm, body, self._leg_settings)
         # no tick waits for a search while something moves
         self._quick = Planner(arm, body, replace(self._leg_settings, search=None, effort=0))
@@ -84,13 +84,23 @@ class ReactivePlanner:
         self._obstacles, self._allowed = tuple(obstacles), tuple(allowed)
         if changed:
             self._bind()
-            self._plan_now = True
+            self._plan_now = not self._strictly
         elif self._moving:
             self._scene.move(self._ahead())
 
-    def go(self, path: PosePath, *, loosely: bool = False, onward: PosePath | None = None) -> None:
-        """Follow a path to its end, joined from wherever the arm is; loosely: until it is within reach of the end."""
+    def go(
+        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+    ) -> None:
+        """Follow a path to its end, joined from wherever the arm is.
+
+        Args:
+            path: of the tcp.
+            loosely: until it is within reach of the end.
+            onward: what comes next: where there is a choice, the path ends in a posture that suits it.
+            strictly: along the path or not at all: no detour, no search; waiting, and the safety layer, as ever.
+        """
         self._nominal = self._path = path
+        self._strictly = strictly
         self._onward, self._joints = onward, None
         pursuit = self.settings.plan.motion.pursuit
         if loosely:
@@ -102,7 +112,7 @@ class ReactivePlanner:
         self._done = self._reached = 0
         self._lost, self._tries, self.reason, self.detail, self._detour = 0.0, 0, "", "", False
         self._why_not = "", ""
-        self._plan_now = bool(self._obstacles)
+        self._plan_now = bool(self._obstacles) and not strictly
         self.state = FOLLOWING
 
     def stop(self) -> None:
@@ -153,7 +163,7 @@ class ReactivePlanner:
             other = self._foresight.ahead(robot, self._path, self._memory, q, part * horizon)
             if _is_better(other, best):
                 best, self._waiting = other, True
-        for plan in self._detours(q, conflict):
+        for plan in () if self._strictly else self._detours(q, conflict):
             other = self._foresight.ahead(robot, plan.path, fresh_memory(), q)
             if _is_better(other, best):
                 best, way, self._waiting = other, plan, False
@@ -224,11 +234,14 @@ class ReactivePlanner:
         waited = self._memory[WAITED]
         if waited > self.settings.patience:
             self._lost += waited
-            if self._lost > self.settings.give_up or (not self._moving and self._tries >= 3):
+            # what stands still at the goal will not leave it
+            hopeless = not self._moving and (self._tries >= 3 or self._why_not[0] == "goal in collision")
+            if hopeless or self._lost > self.settings.give_up:
                 self.state, (self.reason, self.detail) = FAILED, self._why()
                 return self._stand(q, FAILED)
             self._tries += 1
-            self._replan(q, self._obstacles)
+            if not self._strictly:
+                self._replan(q, self._obstacles)
             self._memory[WAITED] = 0.0
         return command
 
@@ -254,7 +267,9 @@ class ReactivePlanner:
         elif plan.success and plan.how == "escape":
             self._path = plan.path
         else:
-            self._path = rest if self._reached else self._nominal
+            # joined where the plan does: it may be that the arm cannot follow what comes before
+            self._reached += plan.guide if plan.success else 0
+            self._path = self._nominal[self._reached :]
         self._why_not = plan.reason, plan.detail
         self._restart(self._path)
 

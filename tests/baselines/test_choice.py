@@ -96,7 +96,7 @@ def test_a_goal_from_which_the_task_goes_on_beats_one_that_is_nearer():
         choice = choose(arm, replace(SETTINGS, search=None), home, a_leg(), onward)
         assert choice.index == wanted and choice.then is not None and choice.then.plan.success
         np.testing.assert_array_equal(choice.then.plan.joints[0], choice.plan.joints[-1])
-        assert choice.onward is not None and choice.onward[-1].gap(choice.then.plan.asked.goal)[0] < 1e-9
+        assert choice.onward is not None and choice.onward.path[-1].gap(choice.then.plan.asked.goal)[0] < 1e-9
         return
     pytest.fail("no other goal can be reached")
 

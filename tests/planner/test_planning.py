@@ -31,7 +31,7 @@ from onedemo.planner.certify import ANGLE_ERROR, POSITION_ERROR, certify
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, UnknownName
 from onedemo.planner.joint_leg import JointSearchSettings
 from onedemo.planner.planning import Planner, plan, plan_batch
-from onedemo.planner.plans import Plan, PlanSettings, Problem
+from onedemo.planner.plans import Onward, Plan, PlanSettings, Problem
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.repet import MAX_OBSTACLES, RepetSettings
 from onedemo.planner.safety import SafetySettings
@@ -269,7 +269,9 @@ def test_a_posture_from_which_the_next_leg_goes_on_is_preferred():
         if found.how != "joint search":
             continue
         lifted = screw_path(scene.goal, at([0.0, 0.0, 0.12]) @ scene.goal, 0.01)
-        looked = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=lifted)
+        looked = planner.plan(
+            demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=Onward(lifted)
+        )
         assert_sound(looked, arm, body, scene.start, scene.goal, scene.obstacles)
         onward = [
             planner.plan(lifted, leg.joints[-1], lifted[-1], scene.obstacles).how == "direct" for leg in (found, looked)
