@@ -26,8 +26,10 @@ from .rooms import arm_room, capsule_ends, point_room, tool_room
 START_ROOM, KEY_ROOM, SWING_ROOM, POSTURE_ROOM, SOLID_ROOM, FLOOR_ROOM = 0.05, 0.03, 0.02, 0.02, 0.02, 0.03
 """Least room [m]: of the arm at the start; of the hand at key poses, beside a swinging one; of the arm's posture there;
 of objects and furniture; above the table."""
-SEEDS = 12
+SEEDS = 24
 """Postures that are tried at each key pose."""
+NEAR = 1.0
+"""Change of a joint [rad] from key to key of a straight motion up to which it is the same posture."""
 TRIES = 60
 """Places that are tried for each obstacle."""
 SWEEP = 21
@@ -54,6 +56,7 @@ class Leg:
         motion: the task's motion index while the hand is on it.
         aside: how far [m] to the side of the hand's straight way an obstacle's center may be.
         above: how far [m] above or below it: more for what sweeps more.
+        straight: so many of the last keys are one straight motion, which an arm does without changing its posture.
     """
 
     start: Pose
@@ -64,6 +67,7 @@ class Leg:
     motion: int
     aside: float = 0.02
     above: float = 0.03
+    straight: int = 1
 
     @cached_property
     def sweep(self) -> np.ndarray:
@@ -101,9 +105,9 @@ class Stage:
         self.legs, self.arm, self.body, self.joints, self.floor = legs, arm, body, joints, floor
         self.tools = [body.holding("held", leg.shape, leg.tcp_from_object, arm).tool(arm) for leg in legs]
         self._solids = pack(solids)
-        self._keys = [key for leg in legs for key in leg.keys]
+        self._keys = [key for leg in legs for key in _alternatives(leg)]
         self._key_poses = [np.array([pose.dq for key in leg.keys for pose in key]) for leg in legs]
-        self._postures: dict[int, list[np.ndarray]] = {}
+        self._postures: dict[int, list[list[np.ndarray]]] = {}
 
     def has_room(self, places: Packed, room: float) -> bool:
         """Whether the start, the key poses, the solids and the table keep their distance to an obstacle's places."""
@@ -118,9 +122,12 @@ class Stage:
         )
 
     def has_postures(self, places: Packed) -> bool:
-        """Whether at each key pose the arm has a posture clear of the obstacles."""
+        """Whether at each key pose, and along what is straight, the arm has a posture clear of all these obstacles."""
         return all(
-            any(arm_room(self.arm, self.body, q, places) >= POSTURE_ROOM for q in self._postures_at(index))
+            any(
+                all(arm_room(self.arm, self.body, q, places) >= POSTURE_ROOM for q in postures)
+                for postures in self._postures_at(index)
+            )
             for index in range(len(self._keys))
         )
 
@@ -135,14 +142,32 @@ class Stage:
             found.append(q)
         return found
 
-    def _postures_at(self, index: int) -> Iterator[np.ndarray]:
-        """The postures at a key pose, found one by one and remembered; the same for every start alike."""
+    def _postures_at(self, index: int) -> list[list[np.ndarray]]:
+        """The postures at a key pose and on from there, remembered; the same for every start alike."""
         if index not in self._postures:
             rng = np.random.default_rng(index)
             seeds = [self.joints, *rng.uniform(self.arm.lower, self.arm.upper, (SEEDS - 1, self.arm.dof))]
-            tried = [inverse_kinematics(self.arm, pose, q) for q in seeds for pose in self._keys[index]]
-            self._postures[index] = [q for q in tried if q is not None]
-        return iter(self._postures[index])
+            tried = [self._along(line, q) for q in seeds for line in self._keys[index]]
+            self._postures[index] = [postures for postures in tried if postures]
+        return self._postures[index]
+
+    def _along(self, line: tuple[Pose, ...], seed: np.ndarray) -> list[np.ndarray]:
+        """Postures at the poses of a line, each near the one before; none where there is none."""
+        found: list[np.ndarray] = []
+        for pose in line:
+            q = inverse_kinematics(self.arm, pose, found[-1] if found else seed)
+            if q is None or (found and np.abs(q - found[-1]).max() > NEAR):
+                return []
+            found.append(q)
+        return found
+
+
+def _alternatives(leg: Leg) -> Iterator[tuple[tuple[Pose, ...], ...]]:
+    """Key by key the lines to follow, one for each of its symmetric alternatives; what is straight is one line."""
+    single = len(leg.keys) - leg.straight
+    for key in leg.keys[:single]:
+        yield tuple((pose,) for pose in key)
+    yield tuple(zip(*leg.keys[single:], strict=True))
 
 
 def placed(
@@ -173,12 +198,12 @@ def _placed_one(rng: np.random.Generator, order: Order, stage: Stage, others: li
     make = {"static": _still, "appear": _appearing, "moving": _swinging, "forearm": _at_forearm}[order.kind]
     for _ in range(TRIES):
         one = make(rng, stage, order.leg, order.size)
-        if one is not None and _apart(one, others) and _fits(stage, one, order.kind):
+        if one is not None and _apart(one, others) and _fits(stage, one, order.kind, others):
             return one
     return None
 
 
-def _fits(stage: Stage, one: Intruder, kind: str) -> bool:
+def _fits(stage: Stage, one: Intruder, kind: str, others: list[Intruder]) -> bool:
     times = (PHASES - one.phase) / one.frequency if one.frequency else np.zeros(1)
     places = pack([Obstacle(one.shape, one.pose(time)) for time in times])
     leg, tool = stage.legs[one.leg], stage.tools[one.leg]
@@ -187,7 +212,11 @@ def _fits(stage: Stage, one: Intruder, kind: str) -> bool:
         return False
     # what appears is not there at the start; that it has room then is seen to when it does
     room = SWING_ROOM if one.frequency else KEY_ROOM
-    return stage.has_room(places, room) and (bool(one.frequency) or stage.has_postures(places))
+    if not stage.has_room(places, room):
+        return False
+    # postures must be clear of all that stand still together
+    still = [Obstacle(each.shape, each.pose(0.0)) for each in (*others, one) if not each.frequency]
+    return bool(one.frequency) or stage.has_postures(pack(still))
 
 
 def _apart(one: Intruder, others: list[Intruder]) -> bool:

@@ -240,7 +240,7 @@ class ShelveEnv(OneDemoEnv):
             back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
             keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
             held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
-            legs.append(Leg(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD))
+            legs.append(Leg(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
         return legs
 
     def _paper(self, legs: list[Leg]) -> list[Order]:

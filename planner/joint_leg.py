@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 FEWER, FEWEST = 4, 100
 """Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
+AROUND = 0.5
+"""Spread [rad] of the starts of the inverse kinematics around the nearest posture."""
 RAMP = 0.3
 """Seconds from rest to full speed."""
 
@@ -50,7 +52,7 @@ class JointSearchSettings:
     step: float = 0.3
     iterations: int = 3000
     nodes: int = 3000
-    seeds: int = 12
+    seeds: int = 48
     targets: int = 3
     postures: int = 4
     rounds: int = 3
@@ -179,9 +181,12 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, see
     home = np.clip(q, np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi))
     for index in sorted({round(i) for i in np.linspace(first, last, search.targets)}):
         path = imitated[index:]
+        near = inverse_kinematics(arm, path[0], home, iterations=150)
         for k in range(seeds):
             low, high = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
             guess = home if k == 0 and seeds == search.seeds else rng.uniform(low, high)
+            if k % 2 and near is not None:  # around the nearest posture the same elbow is found turned
+                guess = np.clip(near + rng.normal(0.0, AROUND, arm.dof), low, high)
             solution = inverse_kinematics(arm, path[0], guess, iterations=150)
             if solution is None or scene.room(solution) < 0.0:
                 continue
