@@ -162,7 +162,7 @@ def joint_leg(
                     best, least = (out[:count].copy(), posture), cost
         if best is not None:
             points, posture = best
-            way = _timed(points, search.speed * arm.velocity_limits, settings.motion.dt)
+            way = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
             joints = np.vstack([way[:-1], posture.tail])
             return JointLeg(joints, posture.path, posture.guide, min(arm.margin(row) for row in joints))
     return None
@@ -213,7 +213,7 @@ def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]
     return (trace[: last + 1].copy() if status == ARRIVED else None), margin
 
 
-def _timed(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:
+def timed_on_lines(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:
     """Points at every tick of `dt` [s] on the straight lines between joint points (n, dof), each from rest to rest.
 
     A corner that is taken at speed throws what is in the hand about.
@@ -230,6 +230,6 @@ def _timed(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:
         total = max(least, ramp) + ramp
         t = np.linspace(0.0, total, math.ceil(total / dt) + 1)[1:]
         begun, left = t * t / (2.0 * least * RAMP), (total - t) ** 2 / (2.0 * least * RAMP)
-        part = np.where(t < ramp, begun, np.where(total - t < ramp, 1.0 - left, (t - 0.5 * ramp) / least))
+        part = np.where(t <= ramp, begun, np.where(total - t <= ramp, 1.0 - left, (t - 0.5 * ramp) / least))
         rows.append(start + part[:, None] * (end - start))
     return np.vstack(rows)

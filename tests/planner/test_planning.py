@@ -29,7 +29,7 @@ from onedemo.planner.body import Body
 from onedemo.planner.body_models import body_from_urdf
 from onedemo.planner.certify import ANGLE_ERROR, POSITION_ERROR, certify
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, UnknownName
-from onedemo.planner.joint_leg import JointSearchSettings
+from onedemo.planner.joint_leg import RAMP, JointSearchSettings, timed_on_lines
 from onedemo.planner.planning import Planner, plan, plan_batch
 from onedemo.planner.plans import Onward, Plan, PlanSettings, Problem
 from onedemo.planner.pose import Pose, PosePath
@@ -557,3 +557,28 @@ def test_frames_of_the_world_do_not_matter_to_success():
         plans.append(Planner(arm, body).plan(path, READY, goal, ball))
         assert_sound(plans[-1], arm, body, READY, goal, ball)
     assert plans[0].how == plans[1].how == "escape"
+
+
+# Ways through joint space
+
+
+@for_all(st.integers(0, 10**6), st.sampled_from([1e-5, 0.01, 0.3, 3.0]), max_examples=60)
+def test_a_way_in_time_stays_on_its_lines_and_keeps_the_speeds_from_rest_to_rest(seed, size):
+    """Every point is on one of the lines, in order; corners are taken at rest; ramps are kept."""
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(0.0, size, (int(rng.integers(2, 6)), 7)), axis=0)
+    speeds, dt = rng.uniform(0.5, 2.0, 7), 0.02
+    rows = timed_on_lines(points, speeds, dt)
+    assert np.abs(rows[0] - points[0]).max() == 0.0 and np.allclose(rows[-1], points[-1], atol=1e-12)
+    assert (np.abs(np.diff(rows, axis=0)) <= speeds * dt * (1 + 1e-9)).all()
+    accelerations = np.abs(np.diff(np.vstack([rows[:1], rows, rows[-1:]]), n=2, axis=0)) / dt**2
+    assert (accelerations <= 1.01 * speeds / RAMP + 1e-9).all()
+    line, along = 0, 0.0
+    for row in rows[1:]:
+        way = points[line + 1] - points[line]
+        s = float((row - points[line]) @ way / (way @ way))
+        assert along < s <= 1.0 + 1e-9 and np.abs(points[line] + s * way - row).max() < 1e-9
+        along = s
+        if s > 1.0 - 1e-9:
+            line, along = line + 1, 0.0
+    assert line == len(points) - 1
