@@ -17,6 +17,7 @@ from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.errors import PlanFailed
 from ..planner.foresight import moves
+from ..planner.joint_leg import STRAY
 from ..planner.planning import Planner
 from ..planner.plans import Onward, Plan, PlanSettings
 from ..planner.pose import Pose, PosePath
@@ -148,7 +149,8 @@ def _choices(
     then: Callable[[int], Leg] | None,
 ) -> Iterator[Choice]:
     """A choice for every goal, and for every goal of the next leg from there the best."""
-    settings = replace(settings, avoid=False, motion=replace(settings.motion, guide=0.0)) if leg.strictly else settings
+    if leg.strictly:
+        settings = replace(settings, avoid=False, stray=STRAY, motion=replace(settings.motion, guide=0.0))
     planner, away = Planner(arm, leg.body, settings), way_out(arm, settings, q, leg)
     for index, goal in enumerate(leg.goals):
         following = None if then is None else then(index)

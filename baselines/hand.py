@@ -24,8 +24,10 @@ from .surroundings import Surroundings
 OPEN, CLOSE = -1.0, 1.0
 LOST = 0.03
 """Distance [m] of an object from where it was grasped in the hand beyond which it was dropped."""
-SLIP, TURN = 0.004, 0.05
+SLIP, TURN = 0.002, 0.02
 """Distance [m] and angle [rad] by which what is in the hand must slip before it is guarded where it is now."""
+OFF = 0.03
+"""Height [m] over its support from which on what was lifted may be led round something."""
 GLANCE = 5
 """Ticks between looks at what is in the hand."""
 Actions = Iterator[np.ndarray]
@@ -150,6 +152,18 @@ class Hand:
             if command.state == FAILED:
                 raise PlanFailed(command.reason, command.detail or self._stall_detail())
             yield self._action(command.velocity)
+
+    def leave(self, path: PosePath, way: float) -> Actions:
+        """Follow a path loosely: strictly until `way` [m] from its beginning, where a detour would push things over.
+
+        Raises:
+            PlanFailed: as `follow`.
+        """
+        away = np.linalg.norm(path.positions - path.positions[0], axis=1) > way
+        free = int(np.argmax(away)) if away.any() else len(path) - 1
+        yield from self.follow(path[: free + 1], loosely=True, strictly=True)
+        if free < len(path) - 1:
+            yield from self.follow(path[free:], loosely=True)
 
     def _mind_held(self) -> None:
         """Guard what is in the hand where it has slipped to."""

@@ -24,7 +24,7 @@ from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.shapes import Obstacle, pack
 from ..planner.tsia import departure, imitated_path, screw_path
-from .hand import CLOSE, LOST, Hand
+from .hand import CLOSE, LOST, OFF, Hand
 from .policy import LabeledPath
 from .pour_goals import PourGoals
 
@@ -107,7 +107,7 @@ class PourProgram:
         grasped, shape = self._held(), self.task.objects[SOURCE].shape
         hand.hold(SOURCE, shape, grasped)
         hand.allow(self._standing)
-        yield from hand.follow(self._lift(hand.arm.fk(hand.q)), loosely=True)
+        yield from hand.leave(self._lift(hand.arm.fk(hand.q)), OFF)
         # the source slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held()
         if held.gap(grasped)[0] > LOST:

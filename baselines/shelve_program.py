@@ -19,8 +19,9 @@ from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.tsia import imitated_path, screw_path
 from .choice import Choice, Leg
-from .hand import CLOSE, LOST, OPEN, Hand
+from .hand import CLOSE, LOST, OFF, OPEN, Hand
 from .policy import LabeledPath
+from .surroundings import FREE_MARGIN, OBJECT_MARGIN
 
 if TYPE_CHECKING:
     from .screw_policy import ScrewSettings
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 CUPBOARD, STAND = "cupboard", "stand"
 BETWEEN = 0.07
 """Way back [m] after which the fingers are no longer between books."""
-PACE = 0.5
-"""Share of the joints' speed limits that is used in the shelf: an arm that is faster goes too far when it stops."""
+PACE = 0.6
+"""Share of the joints' speed limits that is used with a book: one that is moved faster turns in the hand."""
 PATIENCE = 5.0
 """Seconds that a book is waited for."""
 
@@ -97,9 +98,14 @@ class ShelveProgram:
     def _lift(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
         grasped = self._held(k)
+        self.hand.slow_down(PACE)
         self.hand.hold(k, target.shape, grasped)
         self.hand.allow((("held", STAND), ("fingers", STAND)))
-        yield from self.hand.follow(self._from_here("lift"), loosely=True)
+        lift = self._from_here("lift")
+        off = int(np.argmax(lift.positions[:, 2] > lift[0].position[2] + OFF))
+        yield from self.hand.follow(lift[: off + 1], loosely=True, strictly=True)
+        self.hand.allow(())
+        yield from self.hand.follow(lift[off:], loosely=True)
         if self._held(k).gap(grasped)[0] > LOST:
             raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
 
@@ -109,17 +115,27 @@ class ShelveProgram:
         # the book slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held(k)
         insertion = self._insertion(k, held)
-        leg = self._leg("carry", k, insertion[0], held=held)
         into = self._leg("insert", k, insertion[-1], touching, held)._replace(strictly=True)
-        choice = self.hand.choose(leg, lambda _: into)
+        leg, choice = self._chosen_carry(k, insertion[0], held, into)
         yield from self._done(choice, leg)
+        self.hand.surroundings.keep(OBJECT_MARGIN)
         self.hand.allow(touching)
-        self.hand.slow_down(PACE)
         yield from self.hand.follow(self._insertion(k, self._held(k)), strictly=True)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(self._release, self.settings.open)
         self.hand.release()
         self.hand.allow(_around(names))
+
+    def _chosen_carry(self, k: int, goal: Pose, held: Pose, into: Leg) -> tuple[Leg, Choice]:
+        """To before the slot, well clear of everything; with little room where there is no other way."""
+        try:
+            self.hand.surroundings.keep(FREE_MARGIN)
+            leg = self._leg("carry", k, goal, held=held)
+            return leg, self.hand.choose(leg, lambda _: into)
+        except PlanFailed:
+            self.hand.surroundings.keep(OBJECT_MARGIN)
+            leg = self._leg("carry", k, goal, held=held)
+            return leg, self.hand.choose(leg, lambda _: into)
 
     def _retreat(self) -> Iterator[np.ndarray]:
         """Straight back: from between the books first, where a detour would push them over."""

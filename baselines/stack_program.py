@@ -17,7 +17,7 @@ from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
 from .choice import Choice, Leg
-from .hand import CLOSE, LOST, OPEN, Hand
+from .hand import CLOSE, LOST, OFF, OPEN, Hand
 from .policy import LabeledPath
 from .surroundings import TABLE
 
@@ -92,7 +92,7 @@ class StackProgram:
         self.hand.hold(k, target.shape, grasped)
         lift = self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
         if lift is not None:
-            yield from self.hand.follow(lift, loosely=True)
+            yield from self.hand.leave(lift, OFF)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held(k)
         if held.gap(grasped)[0] > LOST:

@@ -16,6 +16,8 @@ TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Distances [m] to keep from what the task itself brings close: things are put down there."""
 INTRUDERS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
+FREE_MARGIN = 0.010
+"""Distance [m] to keep where nothing has to be near: a moving arm lags some millimetres behind what guards it."""
 MOVED = 1e-3
 """Change of a pose vector's entry from which an object is in another place."""
 
@@ -44,6 +46,11 @@ class Surroundings:
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
         """The contacts that are wanted from now on, besides those that nobody needs to look at."""
         self.allowed = (*self._task.touching, *contacts)
+
+    def keep(self, margin: float) -> None:
+        """The distance [m] to keep from objects and furniture from now on."""
+        self._margin = margin
+        self._poses[:] = np.inf
 
     def without(self, index: int | None) -> None:
         """From now on an object is in the hand, or none is."""

@@ -33,6 +33,8 @@ SPACING, MOST_PLACES = 0.04, 10
 """Way [m] between the places at which a moving obstacle is planned round, and how many of them at most."""
 BEFORE, BEHIND = 0.4, 0.8
 """Seconds about the moment of the first conflict in which an obstacle's places are planned round."""
+GAIN = 0.3
+"""Seconds by which waiting or a detour must arrive sooner than going on."""
 HAIR = 1e-3
 """Room [m] by which a roll-out may come closer than it is or must keep, and still count as safe."""
 
@@ -134,6 +136,13 @@ class Foresight:
 
     def _tool(self, q: np.ndarray) -> Pose:
         return Pose(np.array(pose_at(self._work, q)))
+
+
+def is_better(one: Ahead, other: Ahead) -> bool:
+    """True if one is safe and the other is not; arrives sooner, if both are; has more room, if none is."""
+    if one.safe != other.safe:
+        return one.safe
+    return one.arrival + GAIN < other.arrival if one.safe else one.room > other.room + HAIR
 
 
 def windows(conflict: float, horizon: float) -> Iterator[tuple[float, float]]:

@@ -27,6 +27,8 @@ FEWER, FEWEST = 4, 100
 """Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
 AROUND = 0.5
 """Spread [rad] of the starts of the inverse kinematics around the nearest posture."""
+STRAY, LOOK = 0.004, 3
+"""Distance [m] from its path up to which a strict leg counts as straight; and ticks between looks at it."""
 RAMP = 0.3
 """Seconds from rest to full speed."""
 
@@ -101,9 +103,31 @@ class After(NamedTuple):
     path: PosePath
     must: bool
 
-    def can_be_done(self, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
-        """True if it can be followed from joints q (dof,)."""
-        return _followed(self.scene, work, self.path, q, settings)[0] is not None
+    def can_be_done(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
+        """True if it can be followed from joints q (dof,); strictly if it must."""
+        joints, _ = _followed(self.scene, work, self.path, q, settings)
+        return joints is not None and (not self.must or strayed(arm, joints, self.path.dqs) <= STRAY)
+
+
+def strayed(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
+    """The farthest [m] that the tool is from a path.
+
+    Args:
+        arm: the arm.
+        joints: (t, dof) on the way.
+        path: (n, 8) poses of the tool.
+    """
+    edges = PosePath(path).positions
+    starts, ways = edges[:-1], np.diff(edges, axis=0)
+    if len(ways) == 0:
+        starts, ways = edges, np.zeros((1, 3))
+    lengths = np.maximum((ways * ways).sum(axis=1), 1e-12)
+    farthest = 0.0
+    for q in joints[::LOOK]:
+        from_start = arm.fk(q).position - starts
+        part = np.clip((from_start * ways).sum(axis=1) / lengths, 0.0, 1.0)
+        farthest = max(farthest, float(np.linalg.norm(from_start - part[:, None] * ways, axis=1).min()))
+    return farthest
 
 
 class _Posture(NamedTuple):
@@ -195,7 +219,7 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, see
                 continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
             cost += search.late * (index - first) / max(last - first, 1)
-            if after is not None and not after.can_be_done(work, tail[-1], settings):
+            if after is not None and not after.can_be_done(arm, work, tail[-1], settings):
                 if after.must:
                     continue
                 cost += 5.0

@@ -8,8 +8,9 @@ the whole arm. Not in the paper, which plans for the end effector's point.
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,37 +19,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arm import Arm
+from .attempts import Attempt, attempts
 from .body import Body
 from .chain import FRAME, forward_into
 from .errors import BadOption
-from .escape import ESCAPED, FREE, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
+from .escape import ESCAPED, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
 from .escape_tree import CANDIDATES, ROUNDS, WIDEST
-from .joint_leg import After, joint_leg
+from .joint_leg import After, joint_leg, strayed
 from .leg import CHANGED, DETOURS, FOLLOWED, FULL, GUIDE, IMITATED, LAST, TREE_ROWS, Buffers, buffers, leg
 from .plans import WHY, Asked, Onward, Plan, PlanSettings, Problem
 from .pose import Pose, PosePath
 from .pursuit import ARRIVED
-from .repet import Corner
 from .scene_work import Layout, SceneWork, checked_obstacles
 from .shapes import Obstacle
 from .tsia import guide_index, imitated_path
 from .workspace import bound
-
-
-class Attempt(NamedTuple):
-    """A closed loop that may be tried.
-
-    Attributes:
-        guide: fraction of the imitated path where the guiding pose is.
-        bias: of the detours, see `RepetSettings.bias`.
-        factor: of the planning margin.
-        early: detours come back to the path at the first pose that they can.
-    """
-
-    guide: float
-    bias: Corner
-    factor: float = 1.0
-    early: bool = False
 
 
 class _Run(NamedTuple):
@@ -123,14 +108,14 @@ class Planner:
     def _followed(self, run: _Run, lead: np.ndarray, seed: int) -> tuple[Plan, int]:
         """The first good plan of the closed loops, else the best of a few, else why there is none; and the tries."""
         escapes, best, extra, failed = [], None, self.settings.effort, None
-        for attempt in self._attempts(escapes):
+        for attempt in attempts(self.settings, escapes):
             if best is not None:
                 if extra == 0:
                     break
                 extra -= 1
             status, pursuit, margin = self._leg(run, lead, attempt, seed)
             escapes.append(status)
-            if pursuit == ARRIVED:
+            if pursuit == ARRIVED and self._is_straight():
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
                 found = found._replace(goes_on=self._goes_on(run, found.joints[-1]))
@@ -170,6 +155,15 @@ class Planner:
         settings = self.settings
         return plan.kept >= settings.keep and plan.end_margin >= settings.end_margin and plan.goes_on
 
+    def _is_straight(self) -> bool:
+        """True if the tool has kept as near to what it has followed as it must."""
+        b, counts, stray = self._buffers, self._buffers.counts, self.settings.stray
+        if math.isinf(stray):
+            return True
+        joints = b.trace[: counts[LAST] + 1]
+        path = np.vstack([self._pose(joints[0]), b.followed[: counts[FOLLOWED]]])
+        return strayed(self.arm, joints, path) <= stray
+
     def _after(self, scene: SceneWork, asked: Asked, onward: Onward | None) -> After | None:
         if onward is None:
             return None
@@ -179,7 +173,7 @@ class Planner:
 
     def _goes_on(self, run: _Run, q: np.ndarray) -> bool:
         """True if what must come next can be done from joints q."""
-        return run.after is None or not run.after.must or run.after.can_be_done(self._work, q, self.settings)
+        return run.after is None or not run.after.must or run.after.can_be_done(self.arm, self._work, q, self.settings)
 
     def _pose(self, q: np.ndarray) -> np.ndarray:
         out = np.empty(8)
@@ -208,27 +202,6 @@ class Planner:
         if status == NODE_LIMIT:
             return f"a tree had {repet.nodes} nodes, see repet.nodes"
         return f"{rows} nodes in the last of {repet.retries + 1} trees" if status == NO_ESCAPE else ""
-
-    def _attempts(self, escapes: list[int]) -> Iterator[Attempt]:
-        """The closed loops that may be tried, the likeliest first.
-
-        Args:
-            escapes: statuses of the tries so far: biases help where the arm could not follow a detour, not where
-                there is none.
-        """
-        settings, (guide, later) = self.settings, (self.settings.motion.guide, self.settings.motion.max_guide)
-        first = settings.biases[0]
-        yield Attempt(guide, first)
-        if escapes[-1] == ESCAPED:
-            yield Attempt(guide, first, early=True)
-        if escapes[-1] in (FREE, ESCAPED):
-            yield Attempt(later, first)
-        if not settings.avoid:
-            return
-        yield Attempt(guide, first, settings.tight)
-        if escapes[-1] == ESCAPED:
-            for bias in settings.biases[1:]:
-                yield Attempt(guide, bias, settings.tight)
 
     def _leg(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
         b, motion, repet = self._buffers, self.settings.motion, self.settings.repet

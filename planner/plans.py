@@ -17,6 +17,7 @@ A plan that is none has a `reason`, the kind of failure, and a `detail`, what in
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -69,6 +70,7 @@ class PlanSettings:
         spacing: screw length [m] between poses of a blend.
         max_seconds: longest motion.
         avoid: False: no detours and no search, the safety layer alone.
+        stray: distance [m] from what it follows that the tool may be led away by the safety layer.
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -83,6 +85,7 @@ class PlanSettings:
     spacing: float = 0.01
     max_seconds: float = 30.0
     avoid: bool = True
+    stray: float = math.inf
 
     def __post_init__(self):
         if not 0.0 < self.tight <= 1.0:
@@ -93,6 +96,8 @@ class PlanSettings:
             raise BadOption("end_margin", f"{self.end_margin} is not a number >= 0")
         if not 0 <= self.effort <= 100:
             raise BadOption("effort", f"{self.effort} is not from 0 to 100")
+        if not self.stray > 0.0:
+            raise BadOption("stray", f"{self.stray} is not a positive number")
         if not self.biases:
             raise BadOption("biases", "there must be at least one")
         for name in ("spacing", "max_seconds"):

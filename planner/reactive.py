@@ -17,15 +17,16 @@ from .arm import Arm
 from .body import Body
 from .clearance import room_of_near
 from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
-from .foresight import HAIR, Ahead, Foresight, moves, nearest, same_scene, swept, windows
+from .foresight import Foresight, is_better, moves, nearest, same_scene, swept, windows
 from .guarded import guarded_tick
+from .joint_leg import STRAY, strayed
 from .planning import Planner
 from .plans import Onward, Plan
 from .pose import Pose, PosePath
 from .pursuit import ARRIVED, INDEX, WAITED
 from .repet import MAX_OBSTACLES
 from .safety import BLOCKED as UNSAFE
-from .safety import safe_velocity
+from .safety import FREE, safe_velocity
 from .scene_work import Layout, SceneWork
 from .shapes import Obstacle, Sphere
 from .workspace import PURSUIT, bound
@@ -36,8 +37,6 @@ DECIDE = 0.2
 """Seconds for which a decision to go on, to wait or to go round holds."""
 WAITS = (0.25, 0.5, 1.0)
 """How long to wait, in parts of the horizon, is what is compared."""
-GAIN = 0.3
-"""Seconds by which waiting or a detour must arrive sooner than going on."""
 HELD_BACK = 0.1
 """Part of the wanted speed below which an arm that something moving is close to is waiting."""
 
@@ -97,7 +96,8 @@ class ReactivePlanner:
             path: of the tcp.
             loosely: until it is within reach of the end.
             onward: what comes next: where there is a choice, the path ends in a posture that suits it.
-            strictly: along the path or not at all: no detour, no search; waiting, and the safety layer, as ever.
+            strictly: along the path or not at all: no detour, no search; where the safety layer leads away from it,
+                the arm stands still, if it can.
         """
         self._nominal = self._path = path
         self._strictly = strictly
@@ -142,6 +142,8 @@ class ReactivePlanner:
         if status == ARRIVED:
             self.state = DONE
             return self._stand(joints, DONE)
+        if self._strictly and safety != FREE and strayed(self.arm, joints[None], path.dqs) > STRAY:
+            return self._waited(joints, self._stand(joints, WAITING))
         if self._moving and self.settings.horizon > 0.0:
             self._decided -= dt
             if self._decided <= 0.0:
@@ -161,11 +163,11 @@ class ReactivePlanner:
         conflict, way = best.conflict, None
         for part in WAITS:
             other = self._foresight.ahead(robot, self._path, self._memory, q, part * horizon)
-            if _is_better(other, best):
+            if is_better(other, best):
                 best, self._waiting = other, True
         for plan in () if self._strictly else self._detours(q, conflict):
             other = self._foresight.ahead(robot, plan.path, fresh_memory(), q)
-            if _is_better(other, best):
+            if is_better(other, best):
                 best, way, self._waiting = other, plan, False
         if way is not None:
             self._reached, self._detour = self._now_at(q), True
@@ -296,13 +298,6 @@ class ReactivePlanner:
         """The wanted contacts of what is there now."""
         names = {obstacle.name for obstacle in obstacles}
         return [pair for pair in self._allowed if pair[0] in self.body.names and pair[1] in names]
-
-
-def _is_better(one: Ahead, other: Ahead) -> bool:
-    """True if one is safe and the other is not; arrives sooner, if both are; has more room, if none is."""
-    if one.safe != other.safe:
-        return one.safe
-    return one.arrival + GAIN < other.arrival if one.safe else one.room > other.room + HAIR
 
 
 def fresh_memory() -> np.ndarray:

@@ -65,6 +65,7 @@ PLANNER_ORDER = [
     "refine",
     "leg",
     "plans",
+    "attempts",
     "planning",
     "command",
     "foresight",
