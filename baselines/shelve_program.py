@@ -128,14 +128,18 @@ class ShelveProgram:
 
     def _chosen_carry(self, k: int, goal: Pose, held: Pose, into: Leg) -> tuple[Leg, Choice]:
         """To before the slot, well clear of everything; with little room where there is no other way."""
-        try:
-            self.hand.surroundings.keep(FREE_MARGIN)
+        failure = PlanFailed("ik_or_limit", f"no posture is found from which {into.name} can go straight")
+        for margin in (FREE_MARGIN, OBJECT_MARGIN):
+            self.hand.surroundings.keep(margin)
             leg = self._leg("carry", k, goal, held=held)
-            return leg, self.hand.choose(leg, lambda _: into)
-        except PlanFailed:
-            self.hand.surroundings.keep(OBJECT_MARGIN)
-            leg = self._leg("carry", k, goal, held=held)
-            return leg, self.hand.choose(leg, lambda _: into)
+            try:
+                choice = self.hand.choose(leg, lambda _: into)
+            except PlanFailed as failed:
+                failure = failed
+            else:
+                if choice.then is not None:
+                    return leg, choice
+        raise failure
 
     def _retreat(self) -> Iterator[np.ndarray]:
         """Straight back: from between the books first, where a detour would push them over."""

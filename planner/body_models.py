@@ -6,6 +6,7 @@ Not in the paper: it moves a point.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -111,11 +112,11 @@ def body_from_urdf(
     return body_of(Robot(str(source), parts, np.zeros(arm.dof), joints), arm, split)
 
 
-def resting_pairs(arm: Arm, body: Body) -> list[tuple[int, int]]:
+def resting_pairs(arm: Arm, body: Body, keep: float = 0.0) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of an arm's own capsules that no check may look at.
 
-    They are in the same or in neighboring frames, where they always touch, or they overlap with every joint in
-    the middle of its range (at zero if it has none), where real links do not: only the capsules do.
+    They are in the same or in neighboring frames, where they always touch, or they are closer than `keep` [m] with
+    every joint in the middle of its range (at zero if it has none), where real links are not: only the capsules are.
     """
     free = ~(np.isfinite(arm.lower) & np.isfinite(arm.upper))
     middle = np.where(free, 0.0, 0.5 * (np.where(free, 0.0, arm.lower) + np.where(free, 0.0, arm.upper)))
@@ -125,9 +126,15 @@ def resting_pairs(arm: Arm, body: Body) -> list[tuple[int, int]]:
     for i in range(len(body)):
         for j in range(i + 1, len(body)):
             gap = segment_distance(*ends[i], *ends[j]) - body.rows[i, RADIUS] - body.rows[j, RADIUS]
-            if abs(body.rows[i, FRAME] - body.rows[j, FRAME]) <= 1 or gap <= 0:
+            if abs(body.rows[i, FRAME] - body.rows[j, FRAME]) <= 1 or gap <= keep:
                 pairs.append((i, j))
     return pairs
+
+
+def body_pairs(arm: Arm, body: Body, keep: float) -> list[tuple[int, int]]:
+    """Pairs (i, j), i < j, of an arm's own capsules that may hit each other: all but `resting_pairs`."""
+    resting = set(resting_pairs(arm, body, keep))
+    return [pair for pair in combinations(range(len(body)), 2) if pair not in resting]
 
 
 def segment_distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:

@@ -15,7 +15,7 @@ from .guarded import guarded_roll_out
 from .ik import inverse_kinematics
 from .joint_search import connect, shortcut
 from .pose import Pose, PosePath
-from .pursuit import ARRIVED
+from .pursuit import ARRIVED, fresh_memory
 from .scene_work import SceneWork
 from .tsia import guide_index, imitated_path
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 FEWER, FEWEST = 4, 100
 """Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
+MUST = 100.0
+"""Cost [rad] of a posture from which what must come next cannot be done."""
 AROUND = 0.5
 """Spread [rad] of the starts of the inverse kinematics around the nearest posture."""
 STRAY, LOOK = 0.004, 3
@@ -82,12 +84,14 @@ class JointLeg(NamedTuple):
         path: the part of the demonstrated path that is followed at the end.
         guide: index in the imitated path at which that part begins.
         margin: smallest joint margin [rad].
+        goes_on: what comes next can be done from its end.
     """
 
     joints: np.ndarray
     path: PosePath
     guide: int
     margin: float
+    goes_on: bool
 
 
 class After(NamedTuple):
@@ -137,6 +141,7 @@ class _Posture(NamedTuple):
     tail: np.ndarray
     path: PosePath
     guide: int
+    goes_on: bool
 
 
 def joint_leg(
@@ -184,11 +189,12 @@ def joint_leg(
                 cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
                 if cost < least:
                     best, least = (out[:count].copy(), posture), cost
-        if best is not None:
+        if best is not None and (least < MUST or later == 0):
             points, posture = best
             way = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
             joints = np.vstack([way[:-1], posture.tail])
-            return JointLeg(joints, posture.path, posture.guide, min(arm.margin(row) for row in joints))
+            margin = min(arm.margin(row) for row in joints)
+            return JointLeg(joints, posture.path, posture.guide, margin, posture.goes_on)
     return None
 
 
@@ -219,18 +225,18 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, see
                 continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
             cost += search.late * (index - first) / max(last - first, 1)
-            if after is not None and not after.can_be_done(arm, work, tail[-1], settings):
-                if after.must:
-                    continue
-                cost += 5.0
-            found.append(_Posture(cost, len(found), solution, tail, path, index))
+            goes_on = after is None or after.can_be_done(arm, work, tail[-1], settings)
+            if not goes_on:
+                assert after is not None
+                cost += MUST if after.must else 5.0
+            found.append(_Posture(cost, len(found), solution, tail, path, index, goes_on))
     return found
 
 
 def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]:
     """Joints of following a path from q among the obstacles, or None; and the smallest joint margin."""
     dof, dt = len(q), settings.motion.dt
-    trace, memory = np.empty((round(settings.max_seconds / dt) + 1, dof)), np.array([0.0, 0.0, np.inf, 0.0])
+    trace, memory = np.empty((round(settings.max_seconds / dt) + 1, dof)), fresh_memory()
     status, last, margin, _ = guarded_roll_out(
         work, scene.robot, path.dqs, q.copy(), dt, memory, np.empty(dof), np.empty(dof), trace, 0
     )

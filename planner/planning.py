@@ -148,6 +148,7 @@ class Planner:
             found.joints, settings.motion.dt, "", "joint search", imitated.dqs, found.path.dqs, self._buffers.tree[:0],
             0, found.margin, 0, 0, 0.0, run.asked, "", found.guide,
             _kept(imitated.dqs, found.path.dqs, settings.motion.guide),
+            goes_on=found.goes_on or run.after is None or not run.after.must,
         )  # fmt: skip
         return _better(best, plan) if best.success else plan
 

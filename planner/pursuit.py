@@ -85,6 +85,11 @@ class RollOut(NamedTuple):
     trace: np.ndarray
 
 
+def fresh_memory() -> np.ndarray:
+    """The memory (4,) of a pursuit that has not begun."""
+    return np.array([0.0, 0.0, np.inf, 0.0])
+
+
 @kernel
 def pursue(work, path, q, dt, memory, qdot):
     """One tick along the path (n, 8): joint speeds into `qdot`, the state of the pursuit in `memory` (4,)."""
@@ -154,7 +159,7 @@ class Pursuit:
         if not 0 < controller.gain * dt <= 1:
             raise BadOption("gain", f"gain * dt = {controller.gain * dt:g} is not in (0, 1]")
         self._work = bound(arm, controller.packed(), (settings or PursuitSettings()).packed())
-        self._memory = np.array([0.0, 0.0, np.inf, 0.0])
+        self._memory = fresh_memory()
 
     @property
     def index(self) -> int:

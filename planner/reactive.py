@@ -23,7 +23,7 @@ from .joint_leg import STRAY, strayed
 from .planning import Planner
 from .plans import Onward, Plan
 from .pose import Pose, PosePath
-from .pursuit import ARRIVED, INDEX, WAITED
+from .pursuit import ARRIVED, INDEX, WAITED, fresh_memory
 from .repet import MAX_OBSTACLES
 from .safety import BLOCKED as UNSAFE
 from .safety import FREE, safe_velocity
@@ -58,6 +58,7 @@ class ReactivePlanner:
         self._nominal: PosePath | None = None
         self._path: PosePath | None = None
         self._memory, self._strictly = np.zeros(4), False
+        self._line: np.ndarray | None = None
         self._planner = Planner(arm, body, self._leg_settings)
         # no tick waits for a search while something moves
         self._quick = Planner(arm, body, replace(self._leg_settings, search=None, effort=0))
@@ -100,7 +101,7 @@ class ReactivePlanner:
                 the arm stands still, if it can.
         """
         self._nominal = self._path = path
-        self._strictly = strictly
+        self._strictly, self._line = strictly, None
         self._onward, self._joints = onward, None
         pursuit = self.settings.plan.motion.pursuit
         if loosely:
@@ -142,7 +143,7 @@ class ReactivePlanner:
         if status == ARRIVED:
             self.state = DONE
             return self._stand(joints, DONE)
-        if self._strictly and safety != FREE and strayed(self.arm, joints[None], path.dqs) > STRAY:
+        if self._strictly and self._is_astray(joints, safety):
             return self._waited(joints, self._stand(joints, WAITING))
         if self._moving and self.settings.horizon > 0.0:
             self._decided -= dt
@@ -193,6 +194,13 @@ class ReactivePlanner:
         settings = self.settings.plan
         alone = SceneWork(self._layout, [place], settings.repet.distance, self._known_allowed([place]))
         return min(alone.room(q), alone.tool_room(goal)) > settings.repet.distance - settings.safety.distance
+
+    def _is_astray(self, q: np.ndarray, safety: int) -> bool:
+        """True if the safety layer has led the tool away from its path, or from the line to its beginning."""
+        assert self._path is not None
+        if self._line is None:
+            self._line = np.vstack([self.arm.fk(q).dq, self._path.dqs])
+        return safety != FREE and strayed(self.arm, q[None], self._line) > STRAY
 
     def _following(self) -> str:
         return ESCAPING if self._detour else FOLLOWING
@@ -298,11 +306,6 @@ class ReactivePlanner:
         """The wanted contacts of what is there now."""
         names = {obstacle.name for obstacle in obstacles}
         return [pair for pair in self._allowed if pair[0] in self.body.names and pair[1] in names]
-
-
-def fresh_memory() -> np.ndarray:
-    """Of a pursuit that has not begun."""
-    return np.array([0.0, 0.0, np.inf, 0.0])
 
 
 def warm_up(arm: Arm, body: Body) -> None:

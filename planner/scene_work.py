@@ -9,6 +9,7 @@ import numpy as np
 
 from .arm import Arm
 from .body import FRAME, Body
+from .body_models import body_pairs
 from .clearance import FIRST, GAP, KEEP, KIND, OTHER, SELF_MARGIN, find_near, room_at
 from .edges import tool_room, tool_work
 from .errors import BadOption
@@ -80,7 +81,9 @@ class Layout:
         self.names, self.safety = body.names, safety
         self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
         self.tool_names = tuple(body.names[row] for row in self.at_tool)
-        self.robot = robot_work((arm,), (body,), nothing, settings=safety.packed(dt))
+        # twice the distance to keep: what is as close at rest would always be in the way
+        pairs = body_pairs(arm, body, 2.0 * safety.self_distance)
+        self.robot = robot_work((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
         self.tool = tool_work(body.tool(arm), nothing)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +30,8 @@ from onedemo.planner.body import Body
 from onedemo.planner.body_models import body_from_urdf
 from onedemo.planner.certify import ANGLE_ERROR, POSITION_ERROR, certify
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, UnknownName
-from onedemo.planner.joint_leg import RAMP, JointSearchSettings, timed_on_lines
+from onedemo.planner.joint_leg import RAMP, After, JointSearchSettings, strayed, timed_on_lines
+from onedemo.planner.joint_search import joint_edge_is_clear, shortcut
 from onedemo.planner.planning import Planner, plan, plan_batch
 from onedemo.planner.plans import Onward, Plan, PlanSettings, Problem
 from onedemo.planner.pose import Pose, PosePath
@@ -582,3 +584,61 @@ def test_a_way_in_time_stays_on_its_lines_and_keeps_the_speeds_from_rest_to_rest
         if s > 1.0 - 1e-9:
             line, along = line + 1, 0.0
     assert line == len(points) - 1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_shortened_ways_keep_their_ends_get_no_longer_and_stay_clear(seed):
+    scene = problem("gap", seed)
+    arm, body, _ = panda()
+    robot = SceneWork.of(arm, body, scene.obstacles, SETTINGS).robot
+    rng, found = np.random.default_rng(seed), 0
+    for _ in range(40):
+        points = np.clip(scene.start + np.cumsum(rng.normal(0.0, 0.12, (6, 7)), axis=0), arm.lower, arm.upper)
+        if not all(joint_edge_is_clear(robot, a, b) for a, b in pairwise(points)):
+            continue
+        path = np.zeros((40, 7))
+        path[:6] = points
+        count = shortcut(robot, path, 6, 100, np.array([seed + 1.0]), np.empty((2, 7)))
+        short = path[:count]
+        np.testing.assert_array_equal(short[[0, -1]], points[[0, -1]])
+        lengths = [np.abs(np.diff(way, axis=0)).max(axis=1).sum() for way in (points, short)]
+        assert lengths[1] <= lengths[0] + 1e-12
+        assert all(joint_edge_is_clear(robot, a, b) for a, b in pairwise(short))
+        found += lengths[1] < 0.9 * lengths[0]
+    assert found
+
+
+def test_how_far_a_tool_strays_is_its_distance_from_the_edges_of_its_path():
+    arm, _, home = panda()
+    start = arm.fk(home)
+    path = screw_path(start, at([0.0, 0.1, 0.0]) @ start, 0.01)
+    assert strayed(arm, home[None], path.dqs) < 1e-12
+    assert strayed(arm, home[None], path[3:].dqs) == pytest.approx(path[3].gap(start)[0], abs=1e-9)
+    lifted = screw_path(at([0.0, -0.005, 0.02]) @ start, at([0.0, 0.1, 0.02]) @ start, 0.01)
+    assert strayed(arm, home[None], lifted.dqs) == pytest.approx(0.02, abs=1e-9)
+    assert strayed(arm, home[None], start.dq[None]) < 1e-12
+
+
+def test_a_leg_that_must_go_on_ends_where_it_can():
+    """Beside a wall the arm can reach the goal in many postures, but only from some of them go straight on."""
+    arm, body, _ = panda()
+    rescued = tried = 0
+    for seed in range(40):
+        scene = problem("gap", seed)
+        plain = solve(scene)
+        if not plain.success:
+            continue
+        lifted = screw_path(scene.goal, at([0.0, 0.0, 0.04]) @ scene.goal, 0.01)
+        planner = Planner(arm, body, SETTINGS)
+        after = After(plain.asked.scene, lifted, must=True)
+        if after.can_be_done(arm, planner._work, plain.joints[-1], SETTINGS):
+            continue
+        tried += 1
+        onward = Onward(lifted, must=True)
+        found = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=onward)
+        assert_sound(found, arm, body, scene.start, scene.goal, scene.obstacles)
+        assert found.goes_on == after.can_be_done(arm, planner._work, found.joints[-1], SETTINGS)
+        rescued += found.goes_on
+        if tried == 12 or rescued:
+            break
+    assert tried and rescued

@@ -21,6 +21,7 @@ from onedemo.planner.command import (
     ReactiveSettings,
 )
 from onedemo.planner.errors import BadOption
+from onedemo.planner.joint_leg import STRAY, strayed
 from onedemo.planner.pose import Pose
 from onedemo.planner.reactive import ReactivePlanner, warm_up
 from onedemo.planner.scene_work import SceneWork
@@ -50,11 +51,11 @@ def ball(place, *, radius=0.04, velocity=(0.0, 0.0, 0.0)):
     return Obstacle(Sphere(radius), Pose.from_position_quaternion(place), np.array(velocity), "ball")
 
 
-def followed(path, world, *, settings=None, ticks=1500):
+def followed(path, world, *, settings=None, ticks=1500, strictly=False):
     """States, joints and rooms of following a path in a world that is a function of the tick."""
     arm, body = robot()
     planner = ReactivePlanner(arm, body, settings)
-    planner.go(path)
+    planner.go(path, strictly=strictly)
     q, states, rooms, trace = START.copy(), [], [], []
     for k in range(ticks):
         obstacles = world(k)
@@ -207,3 +208,38 @@ def test_absurd_settings_are_refused(change):
 
 def test_warming_up_needs_no_more_than_an_arm_and_its_body():
     warm_up(*robot())
+
+
+# Strictly along the path
+
+BESIDE = np.array([0.0, 0.0, 0.13])
+
+
+def test_strictly_nothing_is_led_round_and_the_tool_stays_on_its_path():
+    """Beside the path the safety layer would push the tool away from it; that is waited out, then given up."""
+    path = sideways()
+    beside = middle(path) + BESIDE
+    things = (ball(beside),)
+    arm, _ = robot()
+    free_states, _, free, _ = followed(path, lambda k: things)
+    assert free_states[-1] == DONE and strayed(arm, free, path.dqs) > 3 * STRAY
+    states, rooms, trace, planner = followed(path, lambda k: things, strictly=True)
+    assert states[-1] == FAILED and planner.reason == "blocked" and "ball" in planner.detail
+    assert ESCAPING not in states and rooms.min() >= -1e-9
+    # a tick past the limit is what it takes to see that it is passed
+    assert strayed(arm, trace, path.dqs) < STRAY + 0.001
+
+
+def test_strictly_it_goes_on_when_what_was_beside_is_gone():
+    path = sideways()
+    things = (ball(middle(path) + BESIDE),)
+    states, _, trace, _ = followed(path, lambda k: things if k < 120 else (), strictly=True)
+    assert WAITING in states and states[-1] == DONE and reached(path, trace[-1])
+
+
+def test_what_stands_still_at_the_goal_is_given_up_at_the_first_stall():
+    path = sideways()
+    things = (ball(path[-1].position),)
+    states, rooms, _, planner = followed(path, lambda k: things, ticks=3000)
+    assert states[-1] == FAILED and planner.reason == "blocked" and rooms.min() >= -1e-9
+    assert len(states) * DT < 10.0
