@@ -81,8 +81,7 @@ class Layout:
         self.names, self.safety = body.names, safety
         self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
         self.tool_names = tuple(body.names[row] for row in self.at_tool)
-        # twice the distance to keep: what is as close at rest would always be in the way
-        pairs = body_pairs(arm, body, 2.0 * safety.self_distance)
+        pairs = body_pairs(arm, body, safety.self_distance)
         self.robot = robot_work((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
         self.tool = tool_work(body.tool(arm), nothing)
 
