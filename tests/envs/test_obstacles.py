@@ -16,12 +16,14 @@ from scipy.spatial import ConvexHull
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.surroundings import intruders_of
+from onedemo.envs.bodies import robot_body
 from onedemo.envs.obstacles import ROOM, Intruder
-from onedemo.envs.placement import FASTEST, LARGEST, SMALLEST, START_ROOM
-from onedemo.envs.scene import ARM, FINGERS
+from onedemo.envs.placement import FASTEST, LARGEST, NEAR, SMALLEST, START_ROOM, Leg, Stage
+from onedemo.envs.rooms import capsule_ends
+from onedemo.envs.scene import ARM, FINGERS, compiled_scene
 from onedemo.planner.errors import OneDemoError
 from onedemo.planner.pose import Pose
-from onedemo.planner.shapes import Box, Capsule, Sphere
+from onedemo.planner.shapes import Box, Capsule, Obstacle, Sphere, pack
 
 SHAPES = [Sphere(0.04), Box((0.05, 0.08, 0.1)), Capsule(0.03, 0.05)]
 IDLE = np.zeros(8)
@@ -266,3 +268,39 @@ def test_nothing_appears_nearer_than_promised():
         env.step(IDLE)
         assert env.sim.obstacles.active[0] == room
     env.close()
+
+
+def a_stage(straight=1):
+    """A Panda that must reach one place from one side, in three poses on a line."""
+    arm, body = compiled_scene("Panda").arms[0].arm, robot_body("Panda")
+    joints = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
+    tcp = arm.fk(joints)
+    keys = [Pose.from_position_quaternion([0.05 * k, 0.0, 0.0]) @ tcp for k in range(3)]
+    leg = Leg(tcp, keys[-1], tuple((key,) for key in keys), Sphere(0.01), Pose.identity(), 0, straight=straight)
+    return Stage([leg], arm, body, joints, [], 0.0), keys
+
+
+def test_obstacles_that_each_leave_a_posture_but_together_none_are_seen():
+    """A ball at an elbow takes some postures away; balls at all elbows take all."""
+    stage, _ = a_stage()
+    elbows = {
+        tuple(capsule_ends(stage.arm, stage.body, postures[0], range(2, 4))[0][1].round(2))
+        for postures in stage._postures_at(0)
+    }
+    assert len(elbows) > 1
+    balls = [Obstacle(Sphere(0.04), Pose.from_position_quaternion(elbow)) for elbow in sorted(elbows)]
+    alone = [ball for ball in balls if stage.has_postures(pack([ball]))]
+    assert alone, "at least one ball alone leaves a posture"
+    assert not stage.has_postures(pack(balls))
+
+
+def test_what_is_straight_is_reached_in_one_posture():
+    stage, keys = a_stage(straight=3)
+    lines = stage._postures_at(0)
+    assert lines
+    for line in lines:
+        assert len(line) == 3 and np.abs(np.diff(line, axis=0)).max() <= NEAR
+        for q, key in zip(line, keys, strict=True):
+            assert max(stage.arm.fk(q).gap(key)) < 1e-3
+    apart, _ = a_stage()
+    assert [len(line) for k in range(3) for line in apart._postures_at(k)[:1]] == [1, 1, 1]
