@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
@@ -11,7 +11,9 @@ from pydantic import TypeAdapter, ValidationError
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadConfig, OneDemoError, UnknownName
+from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
 from .policy import Policy
+from .program_policy import ProgramPolicy
 from .screw_policy import ScrewPolicy, ScrewSettings
 
 Settings = TypeVar("Settings")
@@ -19,13 +21,24 @@ Settings = TypeVar("Settings")
 
 @dataclass(frozen=True, slots=True)
 class PolicyKind:
-    """A policy that a config may name: its settings' dataclass and its constructor."""
+    """A policy that a config may name: its settings' dataclass, its constructor, and settings that name it."""
 
     settings: type
-    make: Callable[[TaskDescription, Demonstration, Any], Policy]
+    make: Callable[[TaskDescription, Demonstration, Any], Policy] = ProgramPolicy
+    preset: Mapping[str, Any] = field(default_factory=dict)
 
 
-POLICIES = {"screw": PolicyKind(ScrewSettings, ScrewPolicy)}
+POLICIES = {
+    "screw": PolicyKind(ScrewSettings, ScrewPolicy),
+    "screw-no-repet": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False}),
+    "screw-no-guard": PolicyKind(ScrewSettings, ScrewPolicy, {"guard": False}),
+    "screw-ee-only": PolicyKind(ScrewSettings, ScrewPolicy, {"whole_arm": False}),
+    "decoupled": PolicyKind(DecoupledSettings),
+    "replay": PolicyKind(ReplaySettings),
+    "dmp-goal": PolicyKind(DmpGoalSettings),
+    "dmp-world": PolicyKind(DmpWorldSettings),
+    "potential": PolicyKind(PotentialSettings),
+}
 
 
 def make_policy(
@@ -45,8 +58,8 @@ def make_policy(
     """
     if name not in POLICIES:
         raise UnknownName("policy", name, POLICIES)
-    kind = POLICIES[name]
-    return kind.make(task, demonstration, settings_from(kind.settings, settings or {}, f"settings of {name!r}"))
+    kind, source = POLICIES[name], f"settings of {name!r}"
+    return kind.make(task, demonstration, settings_from(kind.settings, {**kind.preset, **(settings or {})}, source))
 
 
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:

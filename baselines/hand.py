@@ -11,10 +11,12 @@ from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.command import DONE, FAILED, ReactiveSettings
 from ..planner.errors import PlanFailed
+from ..planner.plans import Plan
 from ..planner.pose import Pose, PosePath
-from ..planner.reactive import ReactivePlanner
 from ..planner.shapes import Shape
 from .choice import Choice, Leg, choose, way_out
+from .made_follower import MadeFollower
+from .mover import MADE, SCREW, Mover
 from .policy import Observation
 from .surroundings import Surroundings
 
@@ -42,12 +44,14 @@ class Hand:
         surroundings: Surroundings,
         observation: Observation,
         index: int = 0,
+        *,
+        mover: Mover = SCREW,
     ):
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
         self.observation, self.surroundings = observation, surroundings
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
-        self._planner = ReactivePlanner(arm, body, settings)
+        self.mover, self._planner = mover, mover.follower(arm, body, settings)
 
     @property
     def measured_tcp(self) -> Pose:
@@ -65,7 +69,7 @@ class Hand:
     def slow_down(self, pace: float) -> None:
         """From now on use a share of the joints' speed limits; the hand must be empty, and on no path."""
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
-        self._planner = ReactivePlanner(self.arm, self.empty, self._planner.settings)
+        self._planner = self.mover.follower(self.arm, self.empty, self._planner.settings)
 
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
         """From now on object `index` is part of the arm, and no longer around it."""
@@ -87,7 +91,7 @@ class Hand:
 
     def choose(self, leg: Leg, then: Callable[[int], Leg] | None = None) -> Choice:
         """The best goal of a leg from here; see `choice.choose`."""
-        return choose(self.arm, self._planner.settings.plan, self.q, leg, then)
+        return choose(self.arm, self._planner.settings.plan, self.q, leg, then, self.mover)
 
     def way_out(self, leg: Leg) -> PosePath | None:
         """How a leg leaves from here; see `choice.way_out`."""
@@ -96,20 +100,32 @@ class Hand:
     def go(self, choice: Choice) -> Actions:
         """Do what was chosen."""
         for path, loosely in choice.parts:
-            yield from self.follow(path, loosely=loosely, onward=choice.onward)
+            plan = None if loosely else choice.plan
+            yield from self.follow(path, loosely=loosely, onward=choice.onward, plan=plan)
 
-    def follow(self, path: PosePath, *, loosely: bool = False, onward: PosePath | None = None) -> Actions:
+    def follow(
+        self,
+        path: PosePath,
+        *,
+        loosely: bool = False,
+        onward: PosePath | None = None,
+        plan: Plan | None = None,
+    ) -> Actions:
         """Follow a path to its end, round what is in the way.
 
         Args:
             path: of the tcp.
             loosely: until it is within reach of the end.
             onward: the path that comes next: where there is a choice, it ends in a posture that suits it.
+            plan: what the path comes from; a hand that moves as it has planned follows that.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience.
         """
-        self._planner.go(path, loosely=loosely, onward=onward)
+        if plan is not None and plan.how in MADE and isinstance(self._planner, MadeFollower):
+            self._planner.follow(plan, loosely=loosely)
+        else:
+            self._planner.go(path, loosely=loosely, onward=onward)
         while True:
             command = self._planned()
             if command.state == DONE:

@@ -19,11 +19,12 @@ from ..planner.body import FRAME, Body
 from ..planner.body_models import resting_pairs
 from ..planner.controller import Controller
 from ..planner.errors import PlanFailed
-from ..planner.motions import MotionSettings
 from ..planner.pose import METERS_PER_RADIAN, Pose, PosePath
 from ..planner.robot_work import PREVIOUS
-from ..planner.safety import BLOCKED, SafetyLayer, SafetySettings
+from ..planner.safety import BLOCKED, SafetyLayer
+from .mover import Mover
 from .policy import Observation
+from .program_settings import ProgramSettings
 from .surroundings import TABLE, TABLE_MARGIN, intruders_of
 
 CLOSE = 1.0
@@ -54,13 +55,14 @@ class TwoHands:
         observation: the latest; the policy renews it before each tick.
     """
 
-    def __init__(self, task: TaskDescription, motion: MotionSettings, safety: SafetySettings, observation: Observation):
-        self.task, self.settings, self._safety = task, motion, safety
+    def __init__(self, task: TaskDescription, settings: ProgramSettings, observation: Observation, mover: Mover):
+        self.task, self.settings, self._safety, self.mover = task, settings.motion, settings.safety, mover
+        self._guard = settings.guard
         self.observation, self.arms = observation, task.arms
         self.q = np.array(observation["joint_positions"], dtype=np.float64)
         self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies, apart=WRIST)
         self._fixed = tuple(replace(f, margin=TABLE_MARGIN) if f.name == TABLE else f for f in task.fixtures)
-        self._controllers = [Controller(arm, motion.controller) for arm in task.arms]
+        self._controllers = [Controller(arm, settings.motion.controller) for arm in task.arms]
         self._layer = self._renewed_layer()
 
     def held(self, arm: int, index: int) -> Pose:
@@ -147,8 +149,11 @@ class TwoHands:
     def _renewed_layer(self) -> SafetyLayer:
         around = (*self._fixed, *intruders_of(self.observation))
         allowed = self.task.touching
+        pairs = self._pairs
+        if not self._guard:
+            around, allowed, pairs = (), (), []
         return SafetyLayer(
-            self.arms, self._bodies, around, self.settings.dt, settings=self._safety, allowed=allowed, pairs=self._pairs
+            self.arms, self._bodies, around, self.settings.dt, settings=self._safety, allowed=allowed, pairs=pairs
         )
 
 

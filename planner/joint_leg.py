@@ -123,9 +123,9 @@ def joint_leg(
         seeds = search.seeds * 2**turn
         found = _postures(arm, scene, work, demonstrated, goal, q, settings, onward, rng, seeds)
         for posture in sorted(found)[: search.postures]:
-            count = connect(scene.robot, q, posture.q, trees, parents, search.step, search.iterations, state, out)
+            count = connect(scene.seen, q, posture.q, trees, parents, search.step, search.iterations, state, out)
             if count:
-                count = shortcut(scene.robot, out, count, search.shortcuts, state)
+                count = shortcut(scene.seen, out, count, search.shortcuts, state)
                 way = _timed(out[:count], search.speed * arm.velocity_limits * settings.motion.dt)
                 joints = np.vstack([way[:-1], posture.tail])
                 return JointLeg(joints, posture.path, posture.guide, min(arm.margin(row) for row in joints))
