@@ -97,9 +97,9 @@ class BimanualPourProgram:
         self.paths += [
             LabeledPath("final", name, path) for name, path in zip(("source", "target"), choice.forth, strict=True)
         ]
-        yield from hands.follow(choice.forth, SLOW)
+        yield from hands.move(choice.forth, SLOW)
         yield from hands.wait(self.settings.drain)
-        yield from hands.follow(choice.back, SLOW)
+        yield from hands.move(choice.back, SLOW)
 
     def _chosen(self, held: list[Pose]) -> Choice:
         """The first choice whose roll-out arrives with room to the joint limits, else the best that arrives."""
@@ -138,7 +138,7 @@ class BimanualPourProgram:
         hold = _turned(held[TARGET], turn, holder) @ _top(self._sizes[TARGET])
         right, left = (arm.fk(q) for arm, q in zip(self.task.arms, self.hands.q, strict=True))
         now = (left @ hold).inverse() @ right @ tool
-        relative, tail, *_ = self.hands.mover.relative(self._carry, now)
+        relative, tail = self.hands.mover.relative(self._carry, now)
         rims, _ = shared_translation(relative[len(relative) - tail :], world_from_rim, SHARE)
         blend = _in_equal_steps(left @ hold, rims[0], len(relative) - tail)
         rims = PosePath(np.concatenate([blend.dqs, rims.dqs]))

@@ -14,6 +14,7 @@ from ..planner.errors import BadConfig, OneDemoError, UnknownName
 from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
 from .policy import Policy
 from .program_policy import ProgramPolicy
+from .sampling_mover import SamplingPolicySettings
 from .screw_policy import ScrewPolicy, ScrewSettings
 
 Settings = TypeVar("Settings")
@@ -38,6 +39,7 @@ POLICIES = {
     "dmp-goal": PolicyKind(DmpGoalSettings),
     "dmp-world": PolicyKind(DmpWorldSettings),
     "potential": PolicyKind(PotentialSettings),
+    "rrt": PolicyKind(SamplingPolicySettings),
 }
 
 

@@ -55,12 +55,10 @@ class Relative(NamedTuple):
     Attributes:
         path: from where it is now, to the end of what was shown.
         tail: how many of its last poses belong to the task; before, there is only the way to them.
-        joints: (t, 2, dof) of both arms where the way is through joint space; None: the path says it.
     """
 
     path: PosePath
     tail: int
-    joints: np.ndarray | None = None
 
 
 class Mover(Protocol):
@@ -87,6 +85,23 @@ class Mover(Protocol):
         """
         ...
 
+    def way_of_two(
+        self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], g: np.ndarray, dt: float
+    ) -> np.ndarray | str | None:
+        """A way of two arms through joint space; None: they move along their paths.
+
+        Args:
+            arms: the arms.
+            q: (2, dof) joints now.
+            ends: where the two tcps must end.
+            g: both arms among obstacles, see `planner.robot_work`.
+            dt: seconds per tick.
+
+        Returns:
+            (t, 2, dof) joints at every tick, or why there is no way.
+        """
+        ...
+
 
 class ScrewMover:
     """TSIA, REPET, the search in joint space, the safety layer; see `Planner` and `ReactivePlanner`."""
@@ -107,6 +122,9 @@ class ScrewMover:
         """See `Mover`."""
         guide = guide_index(shown, GUIDE_START)
         return Relative(final_path(start, shown, guide), len(shown) - guide)
+
+    def way_of_two(self, arms, q, ends, g, dt) -> None:
+        """Along their paths."""
 
 
 SCREW = ScrewMover()

@@ -30,6 +30,8 @@ from .surroundings import TABLE, TABLE_MARGIN, intruders_of
 CLOSE = 1.0
 WRIST = 3
 """Joints between capsules of one arm that are kept apart: across a wrist, whose axes meet, they are always close."""
+NEAR = 0.02
+"""Distance [rad] of every joint to the next of a way through joint space at which it counts as reached."""
 Paths = tuple[PosePath, PosePath]
 
 
@@ -83,6 +85,29 @@ class TwoHands:
         self._pairs = [(i, j) for i, j in pairs if names[i] == names[j] or not {names[i], names[j]} <= meant]
         self._layer = self._renewed_layer()
 
+    def move(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
+        """Bring both hands along paths, or to their ends by another way if the mover has one; see `follow`."""
+        layer, ends = self._renewed_layer(guard=True), [path[-1] for path in paths]
+        way = self.mover.way_of_two(self.arms, self.q, ends, layer.work, self.settings.dt)
+        if way is None:
+            return self.follow(paths, radius)
+        if isinstance(way, str):
+            reason = "ik_or_limit" if way == "ik_or_limit" else "blocked"
+            raise PlanFailed(reason, "no way of both arms through joint space was found")
+        return self._follow_joints(way)
+
+    def _follow_joints(self, way: np.ndarray) -> Iterator[np.ndarray]:
+        """Along joints (t, 2, dof), as far as the safety layer lets them."""
+        index, waited = 0, 0.0
+        while index < len(way):
+            wanted = (way[index] - self.q).ravel() / self.settings.dt
+            yield self._action(self._layer(self.q.ravel(), wanted).velocity.reshape(self.q.shape))
+            waited += self.settings.dt
+            if np.abs(self.q - way[index]).max() < NEAR:
+                index, waited = index + 1, 0.0
+            elif waited > self.settings.pursuit.patience:
+                raise PlanFailed("blocked", f"no progress at {index / len(way):.0%} of the way of both hands")
+
     def follow(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
         """Follow two paths of the same length; each pose is left when both are within a screw length of it [m].
 
@@ -118,7 +143,7 @@ class TwoHands:
         start, previous = self.q.copy(), self._layer.work[PREVIOUS].copy()
         margin, reason = np.inf, ""
         try:
-            for _ in self.follow(paths, radius):
+            for _ in self.move(paths, radius):
                 margin = min(margin, *(arm.margin(q) for arm, q in zip(self.arms, self.q, strict=True)))
         except PlanFailed as failure:
             reason = failure.reason
@@ -146,11 +171,11 @@ class TwoHands:
         self.q = self.q + self.settings.dt * normalized * limits
         return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
 
-    def _renewed_layer(self) -> SafetyLayer:
+    def _renewed_layer(self, *, guard: bool = False) -> SafetyLayer:
         around = (*self._fixed, *intruders_of(self.observation))
         allowed = self.task.touching
         pairs = self._pairs
-        if not self._guard:
+        if not (guard or self._guard):
             around, allowed, pairs = (), (), []
         return SafetyLayer(
             self.arms, self._bodies, around, self.settings.dt, settings=self._safety, allowed=allowed, pairs=pairs
