@@ -22,9 +22,11 @@ from .makers import Made, Maker, straight_path
 from .near_tool import NearTool
 
 LEAST_STEPS = 50
-"""Steps of the shortest primitive."""
-CLOSE = 1e-4
+"""Steps of the shortest primitive; a longer one has as many as the segment has poses."""
+CLOSE = 5e-4
 """Screw distance to the goal at which it has arrived: [m], and a fifth of it in radians."""
+LEAST_ROOM = 1e-3
+"""Room [m] below which an obstacle counts as no nearer: the direction to it must stay."""
 LONGER = 2.0
 """Time until it is given up, over the demonstration's."""
 
@@ -35,13 +37,16 @@ class DmpSettings:
 
     Attributes:
         weights: of the forcing term, per dimension.
+        regularization: of their regression; without any, what is left of the force at the end holds the primitive
+            some millimeters off its goal.
         gamma: gain of the coupling term; 0: obstacles are not looked at.
         beta: how fast the coupling term falls with the angle between motion and obstacle [1/rad].
         influence: distance [m] at which an obstacle begins to count. The formula has none: it would turn away
             from what is far behind the goal.
     """
 
-    weights: int = 30
+    weights: int = 60
+    regularization: float = 1e-4
     gamma: float = 3000.0
     beta: float = 2.0
     influence: float = 0.1
@@ -49,7 +54,7 @@ class DmpSettings:
     def __post_init__(self):
         if not 2 <= self.weights <= 1000:
             raise BadOption("weights", f"{self.weights} is not from 2 to 1000")
-        for name in ("gamma", "beta", "influence"):
+        for name in ("regularization", "gamma", "beta", "influence"):
             if not 0.0 <= getattr(self, name) <= 1e6:
                 raise BadOption(name, f"{getattr(self, name)} is not from 0 to a million")
 
@@ -78,14 +83,13 @@ class Dmp(Maker):
         state = _vector(world.inverse() @ start, learned.quaternions[0])
         ends = _vector(world.inverse() @ goal, state[3:])
         primitive.configure(start_y=state.copy(), goal_y=ends)
-        first = (primitive, world, 0, state, np.zeros(6))
-        return self._made([start.dq], [first], near)
+        return self._made([(primitive, world, 0, state, np.zeros(6))], near)
 
     def renewed(self, made: Made, index: int, near: NearTool) -> Made:
         """See `Maker`."""
         if not made.states:
             return made
-        return self._made(list(made.path.dqs[: index + 1]), list(made.states[: index + 1]), near)
+        return self._made(list(made.states[: index + 1]), near)
 
     def _learned(self, shown: PosePath) -> Any:
         """A primitive that has learned a path (in its own frame), over one unit of time."""
@@ -95,27 +99,28 @@ class Dmp(Maker):
         along = t**3 * (10.0 - 15.0 * t + 6.0 * t**2) * lengths[-1]
         poses = _interpolated(shown, lengths, along)
         primitive = self._library.CartesianDMP(
-            execution_time=1.0, dt=1.0 / count, n_weights_per_dim=self.settings.weights, int_dt=0.5 / count
+            execution_time=1.0, dt=1.0 / count, n_weights_per_dim=self.settings.weights, int_dt=1.0 / count
         )
-        primitive.imitate(t, poses.vectors)
+        primitive.imitate(t, poses.vectors, regularization_coefficient=self.settings.regularization)
         return primitive
 
-    def _made(self, rows: list, states: list, near: NearTool) -> Made:
+    def _made(self, states: list, near: NearTool) -> Made:
         """Go on from the last state: (primitive, its frame, step, position and quaternion, velocity)."""
         primitive, world, step, y, yd = states[-1]
         coupling = _Coupling(self._library, self.settings, world, near)
-        goal = _pose(primitive.goal_y)
+        goal = primitive.goal_y
         for count in range(step, round(LONGER / primitive.dt_)):
-            distance, angle = _pose(y).gap(goal)
-            if max(distance, 0.2 * angle) < CLOSE:
+            # for small angles, half the angle is the difference of the quaternions
+            if np.linalg.norm(y[:3] - goal[:3]) < CLOSE and 0.4 * np.linalg.norm(y[3:] - goal[3:]) < CLOSE:
+                # the rest of the way to an attractor takes forever
+                states.append((primitive, world, count, goal, yd))
                 break
-            coupling.turn = y[3:] / np.linalg.norm(y[3:])
-            primitive.t = count * primitive.dt_
+            coupling.turn, primitive.t = y[3:], count * primitive.dt_
             y, yd = primitive.step(y.copy(), yd.copy(), coupling_term=None if near.empty else coupling)
             y[3:] /= np.linalg.norm(y[3:])
-            rows.append((world @ _pose(y)).dq)
             states.append((primitive, world, count + 1, y, yd))
-        return Made(PosePath(dq.continuous(np.array(rows))), tuple(states))
+        rows = np.array([each[3] for each in states])
+        return Made(PosePath.from_vectors(rows).moved(world), tuple(states))
 
 
 class _Coupling:
@@ -126,7 +131,8 @@ class _Coupling:
 
     def __init__(self, library: ModuleType, settings: DmpSettings, world: Pose, near: NearTool):
         self._term = library.obstacle_avoidance_acceleration_3d
-        self._settings, self._world, self._near = settings, world, near
+        self._settings, self._near = settings, near
+        self._position, self._quaternion, self._rotation = world.position, world.dq[:4], world.rotation
         self.turn = np.array([1.0, 0.0, 0.0, 0.0])
 
     def coupling(self, y: np.ndarray, yd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,12 +140,13 @@ class _Coupling:
         total = np.zeros(3)
         if len(y) != 3 or not self._settings.gamma or np.linalg.norm(yd) < 1e-9:
             return np.zeros(3), total
-        pose = self._world @ Pose.from_position_quaternion(np.array(y), self.turn)
-        back = self._world.rotation.T
-        for room, reach, *normal in self._near.at(pose, self._settings.influence):
-            towards = np.array(y) - max(room, 1e-3) * (back @ np.array(normal))
-            share = 1.0 - max(room, 0.0) / reach
-            total += share * self._term(np.array(y), np.array(yd), towards, self._settings.gamma, self._settings.beta)
+        y, yd, settings = np.array(y), np.array(yd), self._settings
+        position = self._position + self._rotation @ y
+        turn = dq.mul(_turning(self._quaternion), _turning(self.turn))[:4]
+        for each in self._near.at(position, turn, settings.influence):
+            towards = y - max(each.room, LEAST_ROOM) * (each.normal @ self._rotation)
+            share = 1.0 - max(each.room, 0.0) / each.reach
+            total += share * self._term(y, yd, towards, settings.gamma, settings.beta)
         return np.zeros(3), total
 
 
@@ -158,5 +165,5 @@ def _vector(pose: Pose, like: np.ndarray) -> np.ndarray:
     return np.concatenate([pose.position, turn])
 
 
-def _pose(vector: np.ndarray) -> Pose:
-    return Pose.from_position_quaternion(vector[:3], vector[3:] / np.linalg.norm(vector[3:]))
+def _turning(quaternion: np.ndarray) -> np.ndarray:
+    return np.concatenate([quaternion, np.zeros(4)])

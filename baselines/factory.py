@@ -12,6 +12,7 @@ from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadConfig, OneDemoError, UnknownName
 from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
+from .own_policy import is_own, own_policy
 from .policy import Policy
 from .program_policy import ProgramPolicy
 from .sampling_mover import SamplingPolicySettings
@@ -49,7 +50,7 @@ def make_policy(
     """A policy for a task.
 
     Args:
-        name: one of `POLICIES`.
+        name: one of `POLICIES`, or a dotted path of your own, see `own_policy`.
         task: `env.unwrapped.task`.
         demonstration: the ONE demonstration.
         settings: the policy's settings as nested mappings; what is missing keeps its default.
@@ -58,10 +59,18 @@ def make_policy(
         UnknownName: no such policy.
         BadConfig: an unknown key, a wrong type, a value out of range.
     """
+    if is_own(name):
+        return own_policy(name, task, demonstration, settings or {})
+    chosen = settings_of(name, settings)
+    return POLICIES[name].make(task, demonstration, chosen)
+
+
+def settings_of(name: str, settings: Mapping[str, Any] | None = None) -> Any:
+    """The checked settings of a policy of `POLICIES`, from nested mappings; what is missing keeps its default."""
     if name not in POLICIES:
         raise UnknownName("policy", name, POLICIES)
-    kind, source = POLICIES[name], f"settings of {name!r}"
-    return kind.make(task, demonstration, settings_from(kind.settings, {**kind.preset, **(settings or {})}, source))
+    kind = POLICIES[name]
+    return settings_from(kind.settings, {**kind.preset, **(settings or {})}, f"settings of {name!r}")
 
 
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,13 +11,26 @@ from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.clearance import GAP, KEEP, NORMAL, OTHER, find_near
 from ..planner.edges import tool_work
-from ..planner.pose import Pose
 from ..planner.robot_work import FRAMES, HEADER, N_NEAR, NEAR, WORLD, place_frames
 from ..planner.safety import contact_masks
 from ..planner.shapes import Obstacle, pack
 
 KNOWN_REACH = 0.01
 """Distance [m] at which what belongs to the task (an obstacle with a margin of its own) begins to push."""
+
+
+class Near(NamedTuple):
+    """The nearest pair of the tool and an obstacle.
+
+    Attributes:
+        room: distance less the obstacle's own margin [m], negative inside.
+        reach: room at which that obstacle begins to push [m].
+        normal: (3,) unit, from the obstacle to the tool.
+    """
+
+    room: float
+    reach: float
+    normal: np.ndarray
 
 
 class NearTool:
@@ -42,22 +56,23 @@ class NearTool:
         ]
         return NearTool(body.tool(arm), obstacles, masks)
 
-    def at(self, pose: Pose, reach: float) -> np.ndarray:
-        """Nearest pair per obstacle within reach [m]: (n, 5) room [m], reach of that obstacle [m], unit normal (3).
+    def at(self, position: np.ndarray, quaternion: np.ndarray, reach: float) -> list[Near]:
+        """What is within reach of the tool at a pose of the tcp.
 
-        The normal points from the obstacle to the tool. Room is distance less the obstacle's own margin.
+        Args:
+            position: (3,) [m].
+            quaternion: (4,) wxyz, unit.
+            reach: [m].
         """
         if self.empty:
-            return np.empty((0, 5))
-        work = self._work
-        work[FRAMES, 3:6], work[FRAMES, 6:10] = pose.position, pose.dq[:4]
+            return []
+        work, least = self._work, {}
+        work[FRAMES, 3:6], work[FRAMES, 6:10] = position, quaternion
         place_frames(work, WORLD)
         find_near(work, reach)
         first = int(work[HEADER, NEAR])
-        near = work[first : first + int(work[HEADER, N_NEAR])]
-        near = near[np.argsort(near[:, GAP], kind="stable")]
-        near = near[np.unique(near[:, OTHER], return_index=True)[1]]
-        known = near[:, KEEP] > 0.0
-        room, within = near[:, GAP] - near[:, KEEP], np.where(known, min(KNOWN_REACH, reach), reach)
-        rows = np.column_stack([room, within, near[:, NORMAL : NORMAL + 3]])
-        return rows[room < within]
+        for row in work[first : first + int(work[HEADER, N_NEAR])]:
+            room, within = row[GAP] - row[KEEP], reach if row[KEEP] == 0.0 else min(KNOWN_REACH, reach)
+            if room < within and (row[OTHER] not in least or room < least[row[OTHER]].room):
+                least[row[OTHER]] = Near(float(room), within, row[NORMAL : NORMAL + 3].copy())
+        return list(least.values())

@@ -90,13 +90,13 @@ class Potential(Maker):
 
     def _change(self, reference: PosePath, index: int, offset: np.ndarray, near: NearTool) -> np.ndarray:
         """Of the offset, in one step: the pull of the reference and the push of what is near."""
-        settings, pose = self.settings, Pose(_shifted(reference.dqs[index], offset))
+        settings, position = self.settings, dq.translation(reference.dqs[index])
         change = -settings.pull * offset
-        left = float(np.linalg.norm(dq.translation(reference.dqs[index]) - dq.translation(reference.dqs[-1])))
+        left = float(np.linalg.norm(position - dq.translation(reference.dqs[-1])))
         fading = min(1.0, left / settings.fade)
-        for room, reach, *normal in near.at(pose, settings.influence):
-            ratio = reach / max(room, LEAST_ROOM)
-            change = change + fading * settings.strength * (ratio - 1.0) * ratio**2 * np.array(normal)
+        for each in near.at(position + offset, reference.dqs[index, :4], settings.influence):
+            ratio = each.reach / max(each.room, LEAST_ROOM)
+            change = change + fading * settings.strength * (ratio - 1.0) * ratio**2 * each.normal
         return change * min(1.0, settings.most / max(float(np.linalg.norm(change)), 1e-12))
 
 

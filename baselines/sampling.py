@@ -6,7 +6,7 @@ grows the trees; whether an edge is clear is asked of the planner's own certific
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -101,14 +101,17 @@ def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
 
 
 class _Search:
-    """OMPL's objects for one robot among obstacles."""
+    """OMPL's objects for one robot among obstacles.
+
+    What OMPL calls back knows nothing of these objects: a ring of references through it would never be freed.
+    """
 
     def __init__(self, g: np.ndarray, low: np.ndarray, high: np.ndarray, settings: SamplingSettings):
         self._ob: Any = needed("ompl.base", "ompl")
         self._og: Any = needed("ompl.geometric", "ompl")
         self._util: Any = needed("ompl.util", "ompl")
         self._util.setLogLevel(self._util.LogLevel.LOG_NONE)
-        self._settings, self._dof, self.asked = settings, len(low), 0
+        self._settings, self._dof, self._asked = settings, len(low), [0]
         bounds = self._ob.RealVectorBounds(self._dof)
         for k in range(self._dof):
             bounds.setLow(k, float(max(low[k], -np.pi)))
@@ -116,9 +119,8 @@ class _Search:
         self._space = self._ob.RealVectorStateSpace(self._dof)
         self._space.setBounds(bounds)
         self._information = self._ob.SpaceInformation(self._space)
-        self._information.setStateValidityChecker(lambda state: room_at(g, self._joints(state), 0.0, 0.1) >= 0.0)
-        self._validator = self._edges(g)
-        self._information.setMotionValidator(self._validator)
+        self._information.setStateValidityChecker(_validity(g, self._dof))
+        self._information.setMotionValidator(_edges(self._ob, self._information, g, self._dof, self._asked))
         self._information.setup()
 
     def solved(self, start: np.ndarray, goals: Sequence[np.ndarray], seed: int) -> np.ndarray | None:
@@ -134,28 +136,33 @@ class _Search:
         planner.setRange(self._settings.step)
         planner.setProblemDefinition(problem)
         planner.setup()
-        planner.solve(self._ob.PlannerTerminationCondition(lambda: self.asked >= self._settings.budget))
+        asked, budget = self._asked, self._settings.budget
+        planner.solve(self._ob.PlannerTerminationCondition(lambda: asked[0] >= budget))
         if not problem.hasExactSolution():
             return None
-        return np.array([self._joints(state) for state in problem.getSolutionPath().getStates()])
-
-    def _edges(self, g: np.ndarray) -> Any:
-        search = self
-
-        class Edges(self._ob.MotionValidator):
-            """Asks for the certificate of an edge."""
-
-            def checkMotion(self, start, end, last_valid=None):
-                search.asked += 1
-                return bool(joint_edge_is_clear(g, search._joints(start), search._joints(end)))
-
-        return Edges(self._information)
-
-    def _joints(self, state: Any) -> np.ndarray:
-        return np.array([state[k] for k in range(self._dof)])
+        return np.array([_joints(state, self._dof) for state in problem.getSolutionPath().getStates()])
 
     def _state(self, q: np.ndarray) -> Any:
         state = self._space.allocState()
         for k, value in enumerate(q):
             state[k] = float(value)
         return state
+
+
+def _validity(g: np.ndarray, dof: int) -> Callable[[Any], bool]:
+    return lambda state: room_at(g, _joints(state, dof), 0.0, 0.1) >= 0.0
+
+
+def _edges(ob: Any, information: Any, g: np.ndarray, dof: int, asked: list[int]) -> Any:
+    """OMPL's question whether an edge is clear, answered by the certificate; counts how often it is asked."""
+
+    class Edges(ob.MotionValidator):
+        def checkMotion(self, start, end, last_valid=None):
+            asked[0] += 1
+            return bool(joint_edge_is_clear(g, _joints(start, dof), _joints(end, dof)))
+
+    return Edges(information)
+
+
+def _joints(state: Any, dof: int) -> np.ndarray:
+    return np.array([state[k] for k in range(dof)])
