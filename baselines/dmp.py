@@ -47,8 +47,8 @@ class DmpSettings:
 
     weights: int = 60
     regularization: float = 1e-4
-    gamma: float = 3000.0
-    beta: float = 2.0
+    gamma: float = 100.0
+    beta: float = 1.0
     influence: float = 0.1
 
     def __post_init__(self):

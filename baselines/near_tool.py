@@ -26,11 +26,13 @@ class Near(NamedTuple):
         room: distance less the obstacle's own margin [m], negative inside.
         reach: room at which that obstacle begins to push [m].
         normal: (3,) unit, from the obstacle to the tool.
+        known: the obstacle belongs to the task.
     """
 
     room: float
     reach: float
     normal: np.ndarray
+    known: bool
 
 
 class NearTool:
@@ -72,7 +74,8 @@ class NearTool:
         find_near(work, reach)
         first = int(work[HEADER, NEAR])
         for row in work[first : first + int(work[HEADER, N_NEAR])]:
-            room, within = row[GAP] - row[KEEP], reach if row[KEEP] == 0.0 else min(KNOWN_REACH, reach)
+            known = bool(row[KEEP] > 0.0)
+            room, within = row[GAP] - row[KEEP], min(KNOWN_REACH, reach) if known else reach
             if room < within and (row[OTHER] not in least or room < least[row[OTHER]].room):
-                least[row[OTHER]] = Near(float(room), within, row[NORMAL : NORMAL + 3].copy())
+                least[row[OTHER]] = Near(float(room), within, row[NORMAL : NORMAL + 3].copy(), known)
         return list(least.values())

@@ -1,8 +1,8 @@
 """TSIA in an artificial potential field: the reference pulls, obstacles push, online and without looking ahead.
 
 The field is Khatib's (1986): `strength (i/room - 1) (i/room)^2` along the normal, i the influence, for the closest
-points of tool and obstacle; near the goal it fades, an idea of Ge and Cui (2000): else a goal beside an obstacle could
-not be reached. As in a tree of REPET only the translation is deflected. Where pull and push are equal it stands still:
+points of tool and obstacle; near the goal it fades (Ge and Cui 2000): else a goal beside an obstacle could not be
+reached. As in a tree of REPET only the translation is deflected. Where pull and push are equal it stands still:
 a local minimum.
 """
 
@@ -33,7 +33,8 @@ class FieldSettings:
         pull: share of the offset from the reference that is taken back in a step.
         strength: of the push [m] per step: four times that much at half the influence.
         influence: room [m] at which an obstacle begins to push.
-        fade: distance [m] of the reference to the goal from which on the push fades.
+        fade: distance [m] to the goal from which on the push fades: of the tool, and of the reference where the
+            obstacle belongs to the task, which is near the goal because it was there when it was shown.
         most: largest change of the offset in a step [m].
         patience: steps that it may take more than the reference has poses.
     """
@@ -92,10 +93,10 @@ class Potential(Maker):
         """Of the offset, in one step: the pull of the reference and the push of what is near."""
         settings, position = self.settings, dq.translation(reference.dqs[index])
         change = -settings.pull * offset
-        left = float(np.linalg.norm(position - dq.translation(reference.dqs[-1])))
-        fading = min(1.0, left / settings.fade)
+        goal = dq.translation(reference.dqs[-1])
         for each in near.at(position + offset, reference.dqs[index, :4], settings.influence):
-            ratio = each.reach / max(each.room, LEAST_ROOM)
+            left = float(np.linalg.norm((position if each.known else position + offset) - goal))
+            fading, ratio = min(1.0, left / settings.fade) ** 2, each.reach / max(each.room, LEAST_ROOM)
             change = change + fading * settings.strength * (ratio - 1.0) * ratio**2 * each.normal
         return change * min(1.0, settings.most / max(float(np.linalg.norm(change)), 1e-12))
 

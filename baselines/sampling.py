@@ -28,7 +28,7 @@ class SamplingSettings:
             clock, so that a run can be repeated.
         step: longest edge [rad].
         goals: joint postures of the goal that are aimed at, at most.
-        seeds: starts of the inverse kinematics.
+        seeds: starts of the inverse kinematics; twice as many, three times over, where none leads to a clear posture.
         approach: length [m] of the straight end of a way to where something must be touched: along the fingers
             to a grasp, from above to a place; 0: none.
         shortcuts: tries to leave out points of what was found.

@@ -28,6 +28,8 @@ from .program_settings import ProgramSettings
 from .sampling import SamplingSettings, joint_way, timed
 
 NO_WAY, NO_POSTURE = "no way found", "ik_or_limit"
+MORE = 3
+"""How often the starts of the inverse kinematics are doubled."""
 APPROACH_STEP = 0.01
 """Way [m] between two postures of a straight end."""
 
@@ -110,8 +112,10 @@ class SamplingPlanner:
 
     def _postures(self, q: np.ndarray, goal: Pose, scene: SceneWork, strict: SceneWork) -> list[Posture]:
         """Clear postures of the goal, the nearest first; if there are any, those that touch on a straight end only."""
-        rng, found = np.random.default_rng(0), []
-        for k in range(self.sampling.seeds):
+        rng, found, seeds = np.random.default_rng(0), [], self.sampling.seeds
+        for k in range(seeds * 2**MORE):
+            if found and k >= seeds:
+                break
             guess = q if k == 0 else rng.uniform(self._low, self._high)
             solution = inverse_kinematics(self.arm, goal, guess, iterations=150)
             if solution is not None and self._is_clear(solution, scene):
