@@ -63,7 +63,7 @@ class MadeFollower(ReactivePlanner):
     def _begun(self, leg: tuple[PosePath, Pose, int], q: np.ndarray) -> Made:
         shown, goal, guide = leg
         made = self._maker.make(shown, self.arm.fk(q), goal, guide, self._near())
-        self._made, self._old, self._age = made, False, 0.0
+        self._made, self._plan_now, self._old, self._age = made, False, False, 0.0
         return made
 
     def _renew(self) -> None:

@@ -6,7 +6,7 @@ follows it. The method's own is `SCREW`; the others of the comparison are in `op
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -86,7 +86,7 @@ class Mover(Protocol):
         ...
 
     def way_of_two(
-        self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], g: np.ndarray, dt: float
+        self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], seen: Callable[[], np.ndarray], dt: float
     ) -> np.ndarray | str | None:
         """A way of two arms through joint space; None: they move along their paths.
 
@@ -94,7 +94,7 @@ class Mover(Protocol):
             arms: the arms.
             q: (2, dof) joints now.
             ends: where the two tcps must end.
-            g: both arms among obstacles, see `planner.robot_work`.
+            seen: gives both arms among obstacles, see `planner.robot_work`.
             dt: seconds per tick.
 
         Returns:
@@ -123,7 +123,7 @@ class ScrewMover:
         guide = guide_index(shown, GUIDE_START)
         return Relative(final_path(start, shown, guide), len(shown) - guide)
 
-    def way_of_two(self, arms, q, ends, g, dt) -> None:
+    def way_of_two(self, arms, q, ends, seen, dt) -> None:
         """Along their paths."""
 
 

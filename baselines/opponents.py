@@ -53,7 +53,7 @@ class MadeMover:
         tail = len(path) - guide_index(path, GUIDE_START) if self._maker.avoids else len(shown)
         return Relative(path, len(shown) - guide if self._maker.guided else min(tail, len(path)))
 
-    def way_of_two(self, arms, q, ends, g, dt) -> None:
+    def way_of_two(self, arms, q, ends, seen, dt) -> None:
         """Along their paths."""
 
 

@@ -87,8 +87,8 @@ class TwoHands:
 
     def move(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
         """Bring both hands along paths, or to their ends by another way if the mover has one; see `follow`."""
-        layer, ends = self._renewed_layer(guard=True), [path[-1] for path in paths]
-        way = self.mover.way_of_two(self.arms, self.q, ends, layer.work, self.settings.dt)
+        ends = [path[-1] for path in paths]
+        way = self.mover.way_of_two(self.arms, self.q, ends, self._seen, self.settings.dt)
         if way is None:
             return self.follow(paths, radius)
         if isinstance(way, str):
@@ -170,6 +170,10 @@ class TwoHands:
         normalized = np.clip(speeds / limits, -1.0, 1.0)
         self.q = self.q + self.settings.dt * normalized * limits
         return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
+
+    def _seen(self) -> np.ndarray:
+        """Both arms among all that is around, guard or not."""
+        return self._renewed_layer(guard=True).work
 
     def _renewed_layer(self, *, guard: bool = False) -> SafetyLayer:
         around = (*self._fixed, *intruders_of(self.observation))
