@@ -21,13 +21,12 @@ from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
-from ..planner.tsia import GUIDE_START, final_path, guide_index
 from .policy import LabeledPath
 from .pour_goals import Size, lip, lip_direction, standing
 from .two_hands import Paths, RollOut, TwoHands
 
 if TYPE_CHECKING:
-    from .screw_policy import ScrewSettings
+    from .program_settings import ProgramSettings
 
 POUR_YAWS = np.deg2rad((120.0, 105.0, 135.0, 90.0))
 """Directions of pouring [rad] in the world that are tried: to the left and away from the robot."""
@@ -67,7 +66,7 @@ class BimanualPourProgram:
     SEGMENTS = ("approach", "carry", "return")
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hands: TwoHands):
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: TwoHands):
         self.task, self.settings, self.hands = task, settings, hands
         self._sizes = [Size.of(each.size) for each in task.objects]
         self._read(shown)
@@ -98,9 +97,9 @@ class BimanualPourProgram:
         self.paths += [
             LabeledPath("final", name, path) for name, path in zip(("source", "target"), choice.forth, strict=True)
         ]
-        yield from hands.follow(choice.forth, SLOW)
+        yield from hands.move(choice.forth, SLOW)
         yield from hands.wait(self.settings.drain)
-        yield from hands.follow(choice.back, SLOW)
+        yield from hands.move(choice.back, SLOW)
 
     def _chosen(self, held: list[Pose]) -> Choice:
         """The first choice whose roll-out arrives with room to the joint limits, else the best that arrives."""
@@ -139,9 +138,7 @@ class BimanualPourProgram:
         hold = _turned(held[TARGET], turn, holder) @ _top(self._sizes[TARGET])
         right, left = (arm.fk(q) for arm, q in zip(self.task.arms, self.hands.q, strict=True))
         now = (left @ hold).inverse() @ right @ tool
-        guide = guide_index(self._carry, GUIDE_START)
-        relative = final_path(now, self._carry, guide)
-        tail = len(self._carry) - guide
+        relative, tail = self.hands.mover.relative(self._carry, now)
         rims, _ = shared_translation(relative[len(relative) - tail :], world_from_rim, SHARE)
         blend = _in_equal_steps(left @ hold, rims[0], len(relative) - tail)
         rims = PosePath(np.concatenate([blend.dqs, rims.dqs]))

@@ -23,6 +23,7 @@ from ..planner.plans import Onward, Plan, PlanSettings
 from ..planner.pose import Pose, PosePath
 from ..planner.shapes import Obstacle
 from ..planner.tsia import departure, final_path, imitated_path, screw_path
+from .mover import DIRECT, ESCAPE, MADE, SCREW, Mover
 
 
 class Leg(NamedTuple):
@@ -37,6 +38,7 @@ class Leg(NamedTuple):
         allowed: contacts that are wanted, see `Planner.plan`.
         leaving: the segment whose beginning is imitated when leaving the start; None: none, blend at once.
         strictly: along the path or not at all, see `ReactivePlanner.go`.
+        done: index in `demonstrated` up to which leaving, now or before, has done it.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Leg(NamedTuple):
     allowed: tuple[tuple[str, str], ...] = ()
     leaving: PosePath | None = None
     strictly: bool = False
+    done: int = 0
 
 
 class Choice(NamedTuple):
@@ -72,16 +75,18 @@ class Choice(NamedTuple):
     @property
     def parts(self) -> list[tuple[PosePath, bool]]:
         """Paths to follow one after the other, and whether loosely."""
-        if self.plan.how == "escape":
+        if self.plan.how == ESCAPE:
             return [(self.plan.path, False)]
-        away = [] if self.departure is None or self.plan.how != "direct" else [(self.departure, True)]
-        return [*away, (self.tail, False)]
+        away = [] if self.departure is None or self.plan.how not in (DIRECT, *MADE) else [(self.departure, True)]
+        return [*away, (self.plan.path if self.plan.how in MADE else self.tail, False)]
 
     @property
     def path(self) -> PosePath:
         """All of it, from where the arm stands, for drawing and as the path that comes next."""
-        if self.plan.how == "escape":
+        if self.plan.how == ESCAPE:
             return self.plan.path
+        if self.plan.how in MADE:
+            return self.plan.path if self.departure is None else self.departure.joined(self.plan.path)
         here = self.plan.asked.arm.fk(self.plan.joints[0])
         start = here if self.departure is None else self.departure[-1]
         path = final_path(start, self.plan.imitated, self.plan.guide)
@@ -97,7 +102,12 @@ class Choice(NamedTuple):
 
 
 def choose(
-    arm: Arm, settings: PlanSettings, q: np.ndarray, leg: Leg, then: Callable[[int], Leg] | None = None
+    arm: Arm,
+    settings: PlanSettings,
+    q: np.ndarray,
+    leg: Leg,
+    then: Callable[[int], Leg] | None = None,
+    mover: Mover = SCREW,
 ) -> Choice:
     """The goal of a leg that is reached best, and from which the next leg can be done.
 
@@ -109,14 +119,15 @@ def choose(
         q: (dof,) joints now.
         leg: the leg.
         then: the next leg, given the index of the goal; None if there is none.
+        mover: how legs are moved.
 
     Raises:
         PlanFailed: "blocked" or "ik_or_limit", no goal can be reached.
     """
     quick = replace(settings, search=None)
-    best = max(_choices(arm, quick, quick, q, leg, then), key=_rank)
+    best = max(_choices(mover, arm, quick, quick, q, leg, then), key=_rank)
     if settings.search is not None and (not best.plan.success or (then is not None and best.then is None)):
-        best = max([best, *_choices(arm, settings, quick, q, leg, then)], key=_rank)
+        best = max([best, *_choices(mover, arm, settings, quick, q, leg, then)], key=_rank)
     if not best.plan.success:
         reason = "ik_or_limit" if best.plan.reason == "ik_or_limit" else "blocked"
         raise PlanFailed(reason, f"no goal of {leg.name} can be reached along the demonstration: {best.plan.why}")
@@ -135,12 +146,13 @@ def way_out(arm: Arm, settings: PlanSettings, q: np.ndarray, leg: Leg) -> PosePa
     up = Pose.from_position_quaternion([0.0, 0.0, length]) @ start
     options = departure(leg.leaving, start, length), screw_path(start, up, radius)
     for path in options:
-        if planner.plan(path, q, path[-1], _still(leg), allowed=leg.allowed).how == "direct":
+        if planner.plan(path, q, path[-1], _still(leg), allowed=leg.allowed).how == DIRECT:
             return path
     return options[0]
 
 
 def _choices(
+    mover: Mover,
     arm: Arm,
     settings: PlanSettings,
     next_settings: PlanSettings,
@@ -151,14 +163,15 @@ def _choices(
     """A choice for every goal, and for every goal of the next leg from there the best."""
     if leg.strictly:
         settings = replace(settings, avoid=False, stray=STRAY, motion=replace(settings.motion, guide=0.0))
-    planner, away = Planner(arm, leg.body, settings), way_out(arm, settings, q, leg)
+    planner, away = mover.planner(arm, leg.body, settings), way_out(arm, settings, q, leg)
     for index, goal in enumerate(leg.goals):
         following = None if then is None else then(index)
         onward = None if following is None else _beginning(following, goal, settings)
-        plan = planner.plan(leg.demonstrated, q, goal, _still(leg), allowed=leg.allowed, leaving=away, onward=onward)
+        shown = leg.demonstrated[mover.skipped(leg.done) :]
+        plan = planner.plan(shown, q, goal, _still(leg), allowed=leg.allowed, leaving=away, onward=onward)
         choice = Choice(index, plan, away)
         if plan.success and following is not None:
-            best = max(_choices(arm, next_settings, next_settings, plan.joints[-1], following, None), key=_rank)
+            best = max(_choices(mover, arm, next_settings, next_settings, plan.joints[-1], following, None), key=_rank)
             choice = choice._replace(then=best if best.plan.success else None)
         yield choice
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
@@ -11,7 +11,11 @@ from pydantic import TypeAdapter, ValidationError
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadConfig, OneDemoError, UnknownName
+from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
+from .own_policy import is_own, own_policy
 from .policy import Policy
+from .program_policy import ProgramPolicy
+from .sampling_mover import SamplingPolicySettings
 from .screw_policy import ScrewPolicy, ScrewSettings
 
 Settings = TypeVar("Settings")
@@ -19,13 +23,25 @@ Settings = TypeVar("Settings")
 
 @dataclass(frozen=True, slots=True)
 class PolicyKind:
-    """A policy that a config may name: its settings' dataclass and its constructor."""
+    """A policy that a config may name: its settings' dataclass, its constructor, and settings that name it."""
 
     settings: type
-    make: Callable[[TaskDescription, Demonstration, Any], Policy]
+    make: Callable[[TaskDescription, Demonstration, Any], Policy] = ProgramPolicy
+    preset: Mapping[str, Any] = field(default_factory=dict)
 
 
-POLICIES = {"screw": PolicyKind(ScrewSettings, ScrewPolicy)}
+POLICIES = {
+    "screw": PolicyKind(ScrewSettings, ScrewPolicy),
+    "screw-no-repet": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False}),
+    "screw-no-guard": PolicyKind(ScrewSettings, ScrewPolicy, {"guard": False}),
+    "screw-ee-only": PolicyKind(ScrewSettings, ScrewPolicy, {"whole_arm": False}),
+    "decoupled": PolicyKind(DecoupledSettings),
+    "replay": PolicyKind(ReplaySettings),
+    "dmp-goal": PolicyKind(DmpGoalSettings),
+    "dmp-world": PolicyKind(DmpWorldSettings),
+    "potential": PolicyKind(PotentialSettings),
+    "rrt": PolicyKind(SamplingPolicySettings),
+}
 
 
 def make_policy(
@@ -34,7 +50,7 @@ def make_policy(
     """A policy for a task.
 
     Args:
-        name: one of `POLICIES`.
+        name: one of `POLICIES`, or a dotted path of your own, see `own_policy`.
         task: `env.unwrapped.task`.
         demonstration: the ONE demonstration.
         settings: the policy's settings as nested mappings; what is missing keeps its default.
@@ -43,10 +59,18 @@ def make_policy(
         UnknownName: no such policy.
         BadConfig: an unknown key, a wrong type, a value out of range.
     """
+    if is_own(name):
+        return own_policy(name, task, demonstration, settings or {})
+    chosen = settings_of(name, settings)
+    return POLICIES[name].make(task, demonstration, chosen)
+
+
+def settings_of(name: str, settings: Mapping[str, Any] | None = None) -> Any:
+    """The checked settings of a policy of `POLICIES`, from nested mappings; what is missing keeps its default."""
     if name not in POLICIES:
         raise UnknownName("policy", name, POLICIES)
     kind = POLICIES[name]
-    return kind.make(task, demonstration, settings_from(kind.settings, settings or {}, f"settings of {name!r}"))
+    return settings_from(kind.settings, {**kind.preset, **(settings or {})}, f"settings of {name!r}")
 
 
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:

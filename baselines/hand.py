@@ -13,11 +13,12 @@ from ..planner.arm import Arm
 from ..planner.body import Body
 from ..planner.command import DONE, FAILED, ReactiveSettings
 from ..planner.errors import PlanFailed
-from ..planner.plans import Onward
+from ..planner.plans import Onward, Plan
 from ..planner.pose import Pose, PosePath
-from ..planner.reactive import ReactivePlanner
 from ..planner.shapes import Shape
 from .choice import Choice, Leg, choose, way_out
+from .made_follower import MadeFollower
+from .mover import MADE, SCREW, Mover
 from .policy import Observation
 from .surroundings import Surroundings
 
@@ -62,13 +63,15 @@ class Hand:
         surroundings: Surroundings,
         observation: Observation,
         index: int = 0,
+        *,
+        mover: Mover = SCREW,
     ):
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
         self.observation, self.surroundings = observation, surroundings
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
         self._held: _Held | None = None
-        self._planner = ReactivePlanner(arm, body, settings)
+        self.mover, self._planner = mover, mover.follower(arm, body, settings)
 
     @property
     def measured_tcp(self) -> Pose:
@@ -86,7 +89,7 @@ class Hand:
     def slow_down(self, pace: float) -> None:
         """From now on use a share of the joints' speed limits; the hand must be on no path."""
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
-        self._planner = ReactivePlanner(self.arm, self._planner.body, self._planner.settings)
+        self._planner = self.mover.follower(self.arm, self._planner.body, self._planner.settings)
 
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
         """From now on object `index` is part of the arm, and no longer around it."""
@@ -114,7 +117,7 @@ class Hand:
 
     def choose(self, leg: Leg, then: Callable[[int], Leg] | None = None) -> Choice:
         """The best goal of a leg from here; see `choice.choose`."""
-        return choose(self.arm, self._planner.settings.plan, self.q, leg, then)
+        return choose(self.arm, self._planner.settings.plan, self.q, leg, then, self.mover)
 
     def way_out(self, leg: Leg) -> PosePath | None:
         """How a leg leaves from here; see `choice.way_out`."""
@@ -125,10 +128,16 @@ class Hand:
         *before, (last, loosely) = choice.parts
         for path, roughly in before:
             yield from self.follow(path, loosely=roughly)
-        yield from self.follow(last, loosely=loosely, onward=choice.onward)
+        yield from self.follow(last, loosely=loosely, onward=choice.onward, plan=choice.plan)
 
     def follow(
-        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+        self,
+        path: PosePath,
+        *,
+        loosely: bool = False,
+        onward: Onward | None = None,
+        strictly: bool = False,
+        plan: Plan | None = None,
     ) -> Actions:
         """Follow a path to its end, round what is in the way.
 
@@ -137,12 +146,16 @@ class Hand:
             loosely: until it is within reach of the end.
             onward: what comes next: where there is a choice, the path ends in a posture that suits it.
             strictly: along the path or not at all.
+            plan: what the path comes from; a hand that moves as it has planned follows that.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", what was in the
                 hand is not.
         """
-        self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)
+        if plan is not None and plan.how in MADE and isinstance(self._planner, MadeFollower):
+            self._planner.follow(plan, loosely=loosely)
+        else:
+            self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)
         for tick in count():
             if tick % GLANCE == 0:
                 self._mind_held()

@@ -19,17 +19,18 @@ from ..envs.task import TaskDescription
 from ..planner.body import Body
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
-from ..planner.planning import Planner
+from ..planner.plans import Plan
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.shapes import Obstacle, pack
 from ..planner.tsia import departure, imitated_path, screw_path
 from .hand import CLOSE, LOST, OFF, Hand
+from .mover import DIRECT, MADE, LegPlanner
 from .policy import LabeledPath
 from .pour_goals import PourGoals
 
 if TYPE_CHECKING:
-    from .screw_policy import ScrewSettings
+    from .program_settings import ProgramSettings
 
 TURNS = np.deg2rad([0.0, *(sign * turn for turn in range(15, 91, 15) for sign in (1, -1))])
 """Turns about a glass's axis [rad] that are tried, the demonstrated direction first."""
@@ -53,6 +54,7 @@ class Way(NamedTuple):
 
     Attributes:
         paths: to follow.
+        plans: what each comes from.
         q: (dof,) joints at the end.
         margin: smallest joint margin on the way [rad].
         rank: 2 as shown, 1 round something or through joint space, 0 does not arrive.
@@ -60,6 +62,7 @@ class Way(NamedTuple):
     """
 
     paths: tuple[PosePath, ...]
+    plans: tuple[Plan | None, ...]
     q: np.ndarray
     margin: float
     rank: int
@@ -68,7 +71,8 @@ class Way(NamedTuple):
     def then(self, other: Way) -> Way:
         """Both, one after the other."""
         margin, rank = min(self.margin, other.margin), min(self.rank, other.rank)
-        return Way((*self.paths, *other.paths), other.q, margin, rank, self.reason or other.reason)
+        paths, plans = (*self.paths, *other.paths), (*self.plans, *other.plans)
+        return Way(paths, plans, other.q, margin, rank, self.reason or other.reason)
 
     @property
     def order(self) -> tuple[int, bool, float]:
@@ -82,7 +86,7 @@ class PourProgram:
     SEGMENTS = ("carry",)
     """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
         self.task, self.settings, self.hand = task, settings, hand
         hand.slow_down(PACE)
         self.shown = {s.name: resampled(shown.segment_path(s.name), settings.resample) for s in shown.segments}
@@ -122,11 +126,12 @@ class PourProgram:
         return self.hand.measured_tcp.inverse() @ self.hand.object_pose(SOURCE)
 
     def _fetch(self) -> Iterator[np.ndarray]:
-        before, after, *_ = self._chosen_fetch().paths
+        way = self._chosen_fetch()
+        before, after, *_ = way.paths
         self.paths.append(LabeledPath("final", f"fetch {self.source}", before.joined(after)))
-        yield from self.hand.follow(before, loosely=True)
+        yield from self.hand.follow(before, loosely=True, plan=way.plans[0])
         self.hand.allow(self._wanted[SOURCE])
-        yield from self.hand.follow(after)
+        yield from self.hand.follow(after, plan=way.plans[1])
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(CLOSE, self.settings.close)
 
@@ -146,10 +151,10 @@ class PourProgram:
             self.paths.append(LabeledPath("final", "carry and pour", carry.joined(tilt)))
             self.hand.allow(())
             try:
-                yield from self.hand.follow(carry, loosely=True)
+                yield from self.hand.follow(carry, loosely=True, plan=way.plans[0])
                 # near the target, the source may come as near to it as was shown
                 self.hand.allow(self._wanted[TARGET])
-                yield from self.hand.follow(tilt)
+                yield from self.hand.follow(tilt, plan=way.plans[1])
                 return
             except PlanFailed:
                 failed.append(turn)
@@ -180,19 +185,20 @@ class PourProgram:
         far = np.flatnonzero(rooms > NEAR)
         return max(1, int(far[-1])) if len(far) else 1
 
-    def _planned(self, planner: Planner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
+    def _planned(self, planner: LegPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
         """A motion to the end of a path, round what is around."""
         plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=allowed)
         followed = path if plan.how == "joint search" or not plan.success else plan.path
-        rank = 0 if not plan.success else 2 if plan.how == "direct" else 1
+        as_shown = plan.how == DIRECT or (plan.how in MADE and plan.kept == 1.0)
+        rank = 0 if not plan.success else 2 if as_shown else 1
         reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"
-        return Way((followed,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason)
+        return Way((followed,), (plan,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason)
 
     def _chosen_fetch(self) -> Way:
         """The grasp, and with it the pouring, that is nearest to what was shown and can be done."""
         hand, best, held = self.hand, None, self.goals.held
-        empty = Planner(hand.arm, self.task.bodies[0], self._plan)
-        full = Planner(hand.arm, self._body(held), replace(self._plan, search=None))
+        empty = hand.mover.planner(hand.arm, self.task.bodies[0], self._plan)
+        full = hand.mover.planner(hand.arm, self._body(held), replace(self._plan, search=None))
         for turn in TURNS:
             goal = self.goals.grasp(hand.object_pose(SOURCE), turn)
             way = self._in_two(empty, imitated_path(self.shown["approach"], goal), hand.q, SOURCE)
@@ -219,7 +225,7 @@ class PourProgram:
             thoroughly: also look for ways through joint space.
         """
         body = self._body(held)
-        quick = Planner(self.hand.arm, body, replace(self._plan, search=None))
+        quick = self.hand.mover.planner(self.hand.arm, body, replace(self._plan, search=None))
         tries = []
         for turn in TURNS:
             if turn not in failed:
@@ -228,21 +234,21 @@ class PourProgram:
                     return tries[-1]
         best = max(tries, key=lambda each: each[0].order)
         if best[0].rank == 0 and thoroughly:
-            thorough = Planner(self.hand.arm, body, self._plan)
+            thorough = self.hand.mover.planner(self.hand.arm, body, self._plan)
             tries = [(self._carried(thorough, q, held, turn), turn) for _, turn in tries[:CHANCES]]
             best = max(tries, key=lambda each: each[0].order)
         return best
 
-    def _carried(self, planner: Planner, q: np.ndarray, held: Pose, turn: float) -> Way:
+    def _carried(self, planner: LegPlanner, q: np.ndarray, held: Pose, turn: float) -> Way:
         """The carry and the tilting of one turn."""
         goal = self.goals.pouring(self.hand.object_pose(TARGET), held, turn)
         return self._in_two(planner, imitated_path(self.shown["carry"], goal), q, TARGET)
 
-    def _in_two(self, planner: Planner, path: PosePath, q: np.ndarray, glass: int) -> Way:
+    def _in_two(self, planner: LegPlanner, path: PosePath, q: np.ndarray, glass: int) -> Way:
         """A path that ends near a glass, which may be touched only by what comes near it on purpose."""
         split = self._near(glass, path, planner.body)
         before, after = path[: split + 1], path[split:]
         way = self._planned(planner, before, q, ())
         if way.rank == 0:
-            return way._replace(paths=(before, after))
+            return way._replace(paths=(before, after), plans=(None, None))
         return way.then(self._planned(planner, after, way.q, self._wanted[glass]))

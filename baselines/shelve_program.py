@@ -24,7 +24,7 @@ from .policy import LabeledPath
 from .surroundings import FREE_MARGIN, OBJECT_MARGIN
 
 if TYPE_CHECKING:
-    from .screw_policy import ScrewSettings
+    from .program_settings import ProgramSettings
 
 CUPBOARD, STAND = "cupboard", "stand"
 BETWEEN = 0.07
@@ -41,7 +41,7 @@ class ShelveProgram:
     SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
         self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
         self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
         self._release = _gripper_after(shown, "insert")

@@ -16,13 +16,14 @@ from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
+from ..planner.tsia import departure
 from .choice import Choice, Leg
 from .hand import CLOSE, LOST, OFF, OPEN, Hand
 from .policy import LabeledPath
 from .surroundings import TABLE
 
 if TYPE_CHECKING:
-    from .screw_policy import ScrewSettings
+    from .program_settings import ProgramSettings
 
 
 def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
@@ -50,12 +51,13 @@ class StackProgram:
     SEGMENTS = ("approach", "transfer")
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
         self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
         step = settings.resample
         self.approach = resampled(shown.segment_path("approach"), step)
         self.transfer = resampled(trimmed(shown.segment_path("transfer"), settings.trim), step)
         self.withdrawal = self.approach.reversed()
+        self._lifted = len(departure(self.transfer, self.transfer[0], settings.motion.departure)) - 1
         self.paths = [
             LabeledPath("demonstrated", "approach", self.approach),
             LabeledPath("demonstrated", "transfer", self.transfer),
@@ -121,7 +123,7 @@ class StackProgram:
         """Object k from the hand to its goal."""
         target = self.task.objects[k]
         goals = releases(target, self.hand.goal_pose(k), held, self.settings.release_height)
-        return self._leg(k, self.transfer, tuple(goals), held=held, leaving=leaving)
+        return self._leg(k, self.transfer, tuple(goals), held=held, leaving=leaving, done=self._lifted)
 
     def _leg(
         self,
@@ -131,6 +133,7 @@ class StackProgram:
         *,
         held: Pose | None = None,
         leaving: PosePath | None = None,
+        done: int = 0,
     ) -> Leg:
         hand, target = self.hand, self.task.objects[k]
         body = hand.empty if held is None else hand.body_with(target.shape, held)
@@ -141,4 +144,4 @@ class StackProgram:
             if pair[1] in [obstacle.name for obstacle in around]
         ]
         allowed = tuple(pair for pair in wanted if pair[0] in body.names)
-        return Leg(target.name, demonstrated, goals, body, around, allowed, leaving)
+        return Leg(target.name, demonstrated, goals, body, around, allowed, leaving, done=done)

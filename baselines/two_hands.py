@@ -19,16 +19,19 @@ from ..planner.body import FRAME, Body
 from ..planner.body_models import resting_pairs
 from ..planner.controller import Controller
 from ..planner.errors import PlanFailed
-from ..planner.motions import MotionSettings
 from ..planner.pose import METERS_PER_RADIAN, Pose, PosePath
 from ..planner.robot_work import PREVIOUS
-from ..planner.safety import BLOCKED, SafetyLayer, SafetySettings
+from ..planner.safety import BLOCKED, SafetyLayer
+from .mover import Mover
 from .policy import Observation
+from .program_settings import ProgramSettings
 from .surroundings import TABLE, TABLE_MARGIN, intruders_of
 
 CLOSE = 1.0
 WRIST = 3
 """Joints between capsules of one arm that are kept apart: across a wrist, whose axes meet, they are always close."""
+NEAR = 0.02
+"""Distance [rad] of every joint to the next of a way through joint space at which it counts as reached."""
 Paths = tuple[PosePath, PosePath]
 
 
@@ -54,13 +57,14 @@ class TwoHands:
         observation: the latest; the policy renews it before each tick.
     """
 
-    def __init__(self, task: TaskDescription, motion: MotionSettings, safety: SafetySettings, observation: Observation):
-        self.task, self.settings, self._safety = task, motion, safety
+    def __init__(self, task: TaskDescription, settings: ProgramSettings, observation: Observation, mover: Mover):
+        self.task, self.settings, self._safety, self.mover = task, settings.motion, settings.safety, mover
+        self._guard = settings.guard
         self.observation, self.arms = observation, task.arms
         self.q = np.array(observation["joint_positions"], dtype=np.float64)
         self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies, apart=WRIST)
         self._fixed = tuple(replace(f, margin=TABLE_MARGIN) if f.name == TABLE else f for f in task.fixtures)
-        self._controllers = [Controller(arm, motion.controller) for arm in task.arms]
+        self._controllers = [Controller(arm, settings.motion.controller) for arm in task.arms]
         self._layer = self._renewed_layer()
 
     def held(self, arm: int, index: int) -> Pose:
@@ -80,6 +84,29 @@ class TwoHands:
         pairs = pairs_of(self.arms, self._bodies, apart=WRIST)
         self._pairs = [(i, j) for i, j in pairs if names[i] == names[j] or not {names[i], names[j]} <= meant]
         self._layer = self._renewed_layer()
+
+    def move(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
+        """Bring both hands along paths, or to their ends by another way if the mover has one; see `follow`."""
+        ends = [path[-1] for path in paths]
+        way = self.mover.way_of_two(self.arms, self.q, ends, self._seen, self.settings.dt)
+        if way is None:
+            return self.follow(paths, radius)
+        if isinstance(way, str):
+            reason = "ik_or_limit" if way == "ik_or_limit" else "blocked"
+            raise PlanFailed(reason, "no way of both arms through joint space was found")
+        return self._follow_joints(way)
+
+    def _follow_joints(self, way: np.ndarray) -> Iterator[np.ndarray]:
+        """Along joints (t, 2, dof), as far as the safety layer lets them."""
+        index, waited = 0, 0.0
+        while index < len(way):
+            wanted = (way[index] - self.q).ravel() / self.settings.dt
+            yield self._action(self._layer(self.q.ravel(), wanted).velocity.reshape(self.q.shape))
+            waited += self.settings.dt
+            if np.abs(self.q - way[index]).max() < NEAR:
+                index, waited = index + 1, 0.0
+            elif waited > self.settings.pursuit.patience:
+                raise PlanFailed("blocked", f"no progress at {index / len(way):.0%} of the way of both hands")
 
     def follow(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
         """Follow two paths of the same length; each pose is left when both are within a screw length of it [m].
@@ -116,7 +143,7 @@ class TwoHands:
         start, previous = self.q.copy(), self._layer.work[PREVIOUS].copy()
         margin, reason = np.inf, ""
         try:
-            for _ in self.follow(paths, radius):
+            for _ in self.move(paths, radius):
                 margin = min(margin, *(arm.margin(q) for arm, q in zip(self.arms, self.q, strict=True)))
         except PlanFailed as failure:
             reason = failure.reason
@@ -144,11 +171,18 @@ class TwoHands:
         self.q = self.q + self.settings.dt * normalized * limits
         return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
 
-    def _renewed_layer(self) -> SafetyLayer:
+    def _seen(self) -> np.ndarray:
+        """Both arms among all that is around, guard or not."""
+        return self._renewed_layer(guard=True).work
+
+    def _renewed_layer(self, *, guard: bool = False) -> SafetyLayer:
         around = (*self._fixed, *intruders_of(self.observation))
         allowed = self.task.touching
+        pairs = self._pairs
+        if not (guard or self._guard):
+            around, allowed, pairs = (), (), []
         return SafetyLayer(
-            self.arms, self._bodies, around, self.settings.dt, settings=self._safety, allowed=allowed, pairs=self._pairs
+            self.arms, self._bodies, around, self.settings.dt, settings=self._safety, allowed=allowed, pairs=pairs
         )
 
 

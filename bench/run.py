@@ -161,6 +161,7 @@ def _made(config: RunConfig, source: Path) -> Any:
 def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
     """Refuse unknown names, and say where they were written."""
     from ..baselines.factory import POLICIES
+    from ..baselines.own_policy import is_own
     from ..envs.levels import LEVELS, OBSTACLES
     from ..envs.robots import ROBOTS
 
@@ -168,7 +169,8 @@ def _check_names(config: RunConfig, source: Path, overrides: list[str]) -> None:
     names = {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
     for key, known in names.items():
         value = getattr(config, key)
-        if value not in known:
+        own = key == "method" and is_own(value)
+        if value not in known and not own:
             where = COMMAND_LINE if key in changed else source
             raise BadConfig(where, key, f"unknown {key} {value!r}; known: {', '.join(map(str, known))}")
 

@@ -76,6 +76,11 @@ class Body:
         keep = [k for k, name in enumerate(self.names) if name not in self.held]
         return Body(self.rows[keep], tuple(self.names[k] for k in keep))
 
+    def at_tool(self, arm: Arm) -> Body:
+        """Only what moves with the tcp: the hand and what it holds."""
+        keep = np.flatnonzero(self.rows[:, FRAME] == arm.dof - 1)
+        return Body(self.rows[keep], tuple(self.names[k] for k in keep), self.held)
+
     def tool(self, arm: Arm) -> np.ndarray:
         """(m', 7) capsules that move with the tcp: core ends a, b in the tcp's frame, radius [m]."""
         tcp_from_last = last_from_tcp(arm).inverse()

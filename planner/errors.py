@@ -104,6 +104,14 @@ class PlanFailed(OneDemoError):
         super().__init__(f"{reason}: {detail}")
 
 
+class MissingExtra(OneDemoError, ImportError):
+    """An optional library is not installed."""
+
+    def __init__(self, library: str, extra: str, detail: str):
+        self.library, self.extra, self.detail = library, extra, detail
+        super().__init__(f"{library} is needed ({detail}): pip install 'onedemo[{extra}]'")
+
+
 class RenderingUnavailable(OneDemoError, RuntimeError):
     """No OpenGL library can draw without a display."""
 

@@ -183,9 +183,9 @@ def joint_leg(
         for posture in sorted(found)[: search.postures]:
             if posture.cost >= least:
                 break  # no way is shorter than the straight line
-            count = connect(scene.robot, q, posture.q, trees, parents, search.step, iterations, state, out)
+            count = connect(scene.seen, q, posture.q, trees, parents, search.step, iterations, state, out)
             if count:
-                count = shortcut(scene.robot, out, count, search.shortcuts, state, ends)
+                count = shortcut(scene.seen, out, count, search.shortcuts, state, ends)
                 cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
                 if cost < least:
                     best, least = (out[:count].copy(), posture), cost

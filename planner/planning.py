@@ -66,7 +66,8 @@ class Planner:
     def hold(self, body: Body) -> None:
         """The body from now on: after something was grasped or released."""
         self.body = body
-        self._layout = Layout(self.arm, body, self.settings.safety, self.settings.motion.dt)
+        settings = self.settings
+        self._layout = Layout(self.arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
 
     def plan(
         self,
@@ -95,7 +96,7 @@ class Planner:
         begun = time.perf_counter()
         q = self.arm.checked(start)
         scene = SceneWork(self._layout, checked_obstacles(obstacles), self.settings.repet.distance, allowed)
-        asked = Asked(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings)
+        asked = Asked(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings, demonstrated)
         run = _Run(asked, scene, demonstrated, q, self._after(scene, asked, onward))
         reason, detail = self._unfit(scene, q, goal)
         if reason:
@@ -187,7 +188,7 @@ class Planner:
             margins = np.minimum(q - self.arm.lower, self.arm.upper - q)
             joint = int(np.argmin(margins))
             return "start beyond a joint limit", f"{self.arm.joint_names[joint]} by {-margins[joint]:.3f} rad"
-        if scene.room(q) < 0.0:
+        if self.settings.guard and scene.room(q) < 0.0:
             return "start in collision", str(scene.tightest(q))
         if scene.tool_room(goal) < 0.0:
             return "goal in collision", str(scene.tightest_of_tool(goal))

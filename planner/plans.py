@@ -71,6 +71,7 @@ class PlanSettings:
         max_seconds: longest motion.
         avoid: False: no detours and no search, the safety layer alone.
         stray: distance [m] from what it follows that the tool may be led away by the safety layer.
+        guard: False: no safety layer; what is returned with success is then proven clear for the tool at most.
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -86,6 +87,7 @@ class PlanSettings:
     max_seconds: float = 30.0
     avoid: bool = True
     stray: float = math.inf
+    guard: bool = True
 
     def __post_init__(self):
         if not 0.0 < self.tight <= 1.0:
@@ -132,6 +134,7 @@ class Asked(NamedTuple):
         obstacles: as they were.
         allowed: pairs of names that may touch.
         settings: of the planner.
+        demonstrated: the segment that was to be imitated, where it was shown.
     """
 
     arm: Arm
@@ -140,6 +143,7 @@ class Asked(NamedTuple):
     obstacles: tuple[Obstacle, ...]
     allowed: tuple[tuple[str, str], ...]
     settings: PlanSettings
+    demonstrated: PosePath | None = None
 
     @property
     def scene(self) -> SceneWork:
@@ -154,7 +158,7 @@ class Plan(NamedTuple):
         joints: (t, dof) joints at every tick, from the start; only the start where nothing was found.
         dt: seconds between them.
         reason: "" if the plan arrives and every step of it is proven clear; else why there is none, see the module.
-        how: "direct", "escape" or "joint search".
+        how: "direct", "escape" or "joint search"; other makers of plans have other words, see `onedemo.baselines`.
         imitated_poses: (n, 8) of the demonstration moved to the goal.
         path_poses: (m, 8) of what was followed: the imitated path behind the guiding pose, or a detour.
         tree_rows: of the last escape tree; none if none was grown.

@@ -73,7 +73,8 @@ class ReactivePlanner:
         self.body = body
         self._planner.hold(body)
         self._quick.hold(body)
-        self._layout = Layout(self.arm, body, self.settings.plan.safety, self.settings.plan.motion.dt)
+        plan = self.settings.plan
+        self._layout = Layout(self.arm, body, plan.safety, plan.motion.dt, guard=plan.guard)
         self._bind()
 
     def see(self, obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]] = ()) -> None:

@@ -44,7 +44,7 @@ def retimed(joints: np.ndarray, dt: float, acceleration_limits: ArrayLike, arm: 
     limits = np.broadcast_to(np.asarray(acceleration_limits, dtype=np.float64), (arm.dof,))
     result = timed(joints, arm.velocity_limits, limits, dt)
     for k, (a, b) in enumerate(pairwise(result.joints)):
-        if not joint_edge_is_clear(scene.robot, np.ascontiguousarray(a), np.ascontiguousarray(b)):
+        if not joint_edge_is_clear(scene.seen, np.ascontiguousarray(a), np.ascontiguousarray(b)):
             detail = f"the timed motion is not clear at {result.time[k]:.2f} s: the spline leaves the plan there"
             raise PlanFailed("plan_failed", detail)
     return result

@@ -74,20 +74,26 @@ class Tightest(NamedTuple):
 
 
 class Layout:
-    """What of the work arrays belongs to the arm and its body: made once, copied for every scene."""
+    """What of the work arrays belongs to the arm and its body: made once, copied for every scene.
 
-    def __init__(self, arm: Arm, body: Body, safety: SafetySettings, dt: float):
+    Without a guard the arm that follows a path is among nothing: it is not held back by what is there.
+    """
+
+    def __init__(self, arm: Arm, body: Body, safety: SafetySettings, dt: float, *, guard: bool = True):
         nothing = pack(())
         self.names, self.safety = body.names, safety
         self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
         self.tool_names = tuple(body.names[row] for row in self.at_tool)
         pairs = body_pairs(arm, body, safety.self_distance)
         self.robot = robot_work((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
+        self.alone = None if guard else robot_work((arm,), (body,), nothing, settings=safety.packed(dt))
         self.tool = tool_work(body.tool(arm), nothing)
 
 
 class SceneWork:
     """The work arrays of an arm among obstacles: `robot` for the whole arm, `tool(factor)` for the tool.
+
+    `seen` is the whole arm among them for queries, also where the layout has no guard and `robot` is among nothing.
 
     Args:
         layout: of the arm and its body.
@@ -107,7 +113,8 @@ class SceneWork:
         self._layout = layout
         self._names = [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(obstacles)]
         masks = contact_masks(layout.names, obstacles, allowed)
-        self.robot = among(layout.robot, packed, masks, layout.safety.distance)
+        self.seen = among(layout.robot, packed, masks, layout.safety.distance)
+        self.robot = self.seen if layout.alone is None else among(layout.alone, pack(()), (), layout.safety.distance)
         tool_masks = [sum(1 << k for k, row in enumerate(layout.at_tool) if mask >> int(row) & 1) for mask in masks]
         self._tool = among(layout.tool, packed, tool_masks, distance)
         self._margins = self._tool[OBSTACLES : OBSTACLES + len(obstacles), MARGIN]
@@ -123,13 +130,13 @@ class SceneWork:
         allowed: Sequence[tuple[str, str]] = (),
     ) -> SceneWork:
         """The arrays for the distances of these settings, laid out anew."""
-        layout = Layout(arm, body, settings.safety, settings.motion.dt)
+        layout = Layout(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
         return SceneWork(layout, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
     def move(self, obstacles: Sequence[Obstacle]) -> None:
         """The same obstacles at other places, with other velocities."""
         rows = pack(obstacles).rows
-        for work in (self.robot, self._tool):
+        for work in (self.seen, self._tool):
             work[OBSTACLES : OBSTACLES + len(rows), PLACE] = rows[:, PLACE]
             work[SEEN, SEEN_COUNTS], work[SEEN, SEEN_MOVING] = 0.0, np.any(rows[:, 17:20])
 
@@ -144,7 +151,7 @@ class SceneWork:
 
     def room(self, q: np.ndarray) -> float:
         """Room [m] of the whole arm at joints q (dof,), up to 1 m."""
-        return float(room_at(self.robot, q, 0.0, 1.0))
+        return float(room_at(self.seen, q, 0.0, 1.0))
 
     def tool_room(self, pose: Pose) -> float:
         """Room [m] of the tool at a pose of the tcp, with the safety distance, up to 1 m."""
@@ -165,8 +172,8 @@ class SceneWork:
 
     def tightest(self, q: np.ndarray) -> Tightest | None:
         """The pair of the whole arm with least room at joints q (dof,); None if nothing is within its distance."""
-        place_capsules(self.robot, q, WORLD)
-        return self._tightest(self.robot, self._layout.names)
+        place_capsules(self.seen, q, WORLD)
+        return self._tightest(self.seen, self._layout.names)
 
     def tightest_of_tool(self, pose: Pose, factor: float | None = None) -> Tightest | None:
         """The pair of the tool with least room at a pose; with the safety distance, or a factor of the planning one."""

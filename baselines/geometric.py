@@ -1,0 +1,78 @@
+"""The policies' ways to move a leg without a task and without physics: thousands of legs in a minute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..planner.arm import Arm
+from ..planner.body import Body
+from ..planner.errors import PlanFailed, UnknownName
+from ..planner.pose import Pose, PosePath
+from ..planner.repet import escape_path, point_tool
+from ..planner.shapes import Obstacle
+from ..planner.tsia import final_path, guide_index, imitated_path
+from .factory import POLICIES, settings_of
+from .mover import LegPlanner
+from .near_tool import NearTool
+from .opponents import MadeSettings
+from .screw_policy import ScrewSettings
+
+PATH_MAKERS = tuple(name for name, kind in POLICIES.items() if issubclass(kind.settings, MadeSettings | ScrewSettings))
+"""Policies that make a path of the tcp; what is left makes joints."""
+
+
+def leg_planner(name: str, arm: Arm, body: Body, settings: Mapping[str, Any] | None = None) -> LegPlanner:
+    """What plans the legs of a policy: `.plan(demonstrated, joints, goal, obstacles)` gives a `Plan` with its joints.
+
+    Args:
+        name: one of `factory.POLICIES`.
+        arm: the arm.
+        body: its capsules, held object included.
+        settings: the policy's, as nested mappings.
+    """
+    chosen = settings_of(name, settings)
+    return chosen.mover.planner(arm, body, chosen.plan)
+
+
+def made_path(
+    name: str,
+    demonstrated: PosePath,
+    start: Pose,
+    goal: Pose,
+    obstacles: Sequence[Obstacle] = (),
+    *,
+    tool: np.ndarray | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> PosePath:
+    """The path that a policy would make; whether it reaches the goal, or stays clear, is for a judge to say.
+
+    Args:
+        name: one of `PATH_MAKERS`.
+        demonstrated: the segment, where it was shown.
+        start: of the tcp.
+        goal: of the tcp.
+        obstacles: where they are now.
+        tool: (m, 7) capsules that move with the tcp, see `Body.tool`; None: a ball of 5 cm about it.
+        settings: the policy's, as nested mappings.
+
+    Raises:
+        PlanFailed: no way round the obstacles was found.
+        UnknownName: no such path maker.
+    """
+    if name not in PATH_MAKERS:
+        raise UnknownName("path maker", name, PATH_MAKERS)
+    chosen, tool = settings_of(name, settings), point_tool(0.05) if tool is None else tool
+    imitated = imitated_path(demonstrated, goal)
+    guide = guide_index(imitated, chosen.motion.guide)
+    if isinstance(chosen, MadeSettings):
+        return chosen.maker.make(demonstrated, start, goal, guide, NearTool(tool, obstacles)).path
+    path = final_path(start, imitated, guide)
+    if not chosen.plan.avoid:
+        return path
+    escape = escape_path(path, tool, obstacles, chosen.plan.repet)
+    if not escape.found:
+        raise PlanFailed("blocked", escape.reason)
+    return escape.path

@@ -1,0 +1,141 @@
+"""The other policies of the comparison: the same programs, other ways to move a leg.
+
+None has a guard by default, since their authors have none; `guard: true` gives each the method's, which shows how
+much of the method the guard alone is.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..planner.arm import Arm
+from ..planner.body import Body
+from ..planner.command import ReactiveSettings
+from ..planner.plans import PlanSettings
+from ..planner.pose import Pose, PosePath
+from ..planner.reactive import ReactivePlanner
+from ..planner.tsia import GUIDE_START, guide_index
+from .dmp import Dmp, DmpSettings
+from .made_follower import MadeFollower
+from .made_planner import MadePlanner
+from .makers import Decoupled, Maker, Replay
+from .mover import LegPlanner, Mover, Relative
+from .near_tool import NearTool
+from .potential import FieldSettings, Potential
+from .program_settings import ProgramSettings
+
+
+class MadeMover:
+    """Legs moved along the paths of a maker."""
+
+    def __init__(self, maker: Maker):
+        self._maker = maker
+
+    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> LegPlanner:
+        """See `Mover`."""
+        return MadePlanner(arm, body, settings, self._maker)
+
+    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> ReactivePlanner:
+        """See `Mover`."""
+        return MadeFollower(arm, body, settings, self._maker)
+
+    def skipped(self, done: int) -> int:
+        """All where the whole segment would be done again; none where there is a guiding pose behind them."""
+        return 0 if self._maker.guided else done
+
+    def relative(self, shown: PosePath, start: Pose) -> Relative:
+        """See `Mover`. Of a path that is nowhere what was shown, the same share counts as the way to it."""
+        guide = guide_index(shown, GUIDE_START)
+        path = self._maker.make(shown, start, shown[-1], guide, NearTool(np.empty((0, 7)), ())).path
+        tail = len(path) - guide_index(path, GUIDE_START) if self._maker.avoids else len(shown)
+        return Relative(path, len(shown) - guide if self._maker.guided else min(tail, len(path)))
+
+    def way_of_two(self, arms, q, ends, seen, dt) -> None:
+        """Along their paths."""
+
+
+@dataclass(frozen=True, slots=True)
+class MadeSettings(ProgramSettings):
+    """Of a policy that moves along the paths of a maker."""
+
+    guard: bool = False
+
+    @property
+    @abstractmethod
+    def maker(self) -> Maker:
+        """Of the paths."""
+
+    @property
+    def mover(self) -> Mover:
+        """See `ProgramSettings`."""
+        return MadeMover(self.maker)
+
+    @property
+    def plan(self) -> PlanSettings:
+        """See `ProgramSettings`."""
+        return PlanSettings(motion=self.motion, safety=self.safety, search=None, avoid=False, guard=self.guard)
+
+
+@dataclass(frozen=True, slots=True)
+class DecoupledSettings(MadeSettings):
+    """Of `decoupled`: TSIA, position and orientation interpolated apart."""
+
+    @property
+    def maker(self) -> Maker:
+        """See `MadeSettings`."""
+        return Decoupled()
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings(MadeSettings):
+    """Of `replay`: the demonstration moved rigidly, a straight way to its beginning."""
+
+    @property
+    def maker(self) -> Maker:
+        """See `MadeSettings`."""
+        return Replay()
+
+
+@dataclass(frozen=True, slots=True)
+class PotentialSettings(MadeSettings):
+    """Of `potential`: TSIA in a potential field.
+
+    Attributes:
+        field: see `FieldSettings`.
+    """
+
+    field: FieldSettings = field(default_factory=FieldSettings)
+
+    @property
+    def maker(self) -> Maker:
+        """See `MadeSettings`."""
+        return Potential(self.field)
+
+
+@dataclass(frozen=True, slots=True)
+class DmpWorldSettings(MadeSettings):
+    """Of `dmp-world`: a primitive learned in the world's frame.
+
+    Attributes:
+        dmp: see `DmpSettings`.
+    """
+
+    dmp: DmpSettings = field(default_factory=DmpSettings)
+
+    @property
+    def maker(self) -> Maker:
+        """See `MadeSettings`."""
+        return Dmp(self.dmp, in_goal_frame=False)
+
+
+@dataclass(frozen=True, slots=True)
+class DmpGoalSettings(DmpWorldSettings):
+    """Of `dmp-goal`: a primitive learned in the goal's frame."""
+
+    @property
+    def maker(self) -> Maker:
+        """See `MadeSettings`."""
+        return Dmp(self.dmp, in_goal_frame=True)

@@ -1,0 +1,79 @@
+"""A policy that runs a task's program, its legs moved by whatever its settings say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..envs.task import TaskDescription
+from ..planner.demo import Demonstration
+from ..planner.errors import BadOption, PlanFailed, UnknownName
+from .bimanual_program import BimanualPourProgram
+from .hand import Hand
+from .policy import EpisodePolicy, Observation, PolicyReport
+from .pour_program import PourProgram
+from .program_settings import ProgramSettings
+from .shelve_program import ShelveProgram
+from .stack_program import StackProgram
+from .surroundings import Surroundings
+from .two_hands import TwoHands
+
+Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram
+PROGRAMS = {
+    "stack": StackProgram,
+    "pour": PourProgram,
+    "shelve": ShelveProgram,
+    "bimanual_pour": BimanualPourProgram,
+}
+
+
+class Episode:
+    """What the policy remembers of an episode: the hand, the running program and how it ended."""
+
+    def __init__(self, hand: Hand | TwoHands, program: Program):
+        self.hand, self.program = hand, program
+        self.actions: Iterator[np.ndarray] | None = program.actions()
+        self.ended = PolicyReport()
+
+
+class ProgramPolicy(EpisodePolicy):
+    """The program of a task, from ONE demonstration.
+
+    Sees the observation, the demonstration and the static task description, nothing else.
+    """
+
+    def __init__(self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings):
+        if task.name not in PROGRAMS:
+            raise UnknownName("task with a program", task.name, PROGRAMS)
+        self.task, self.demonstration, self.settings = settings.known(task), demonstration, settings
+        self.mover = settings.mover
+        if abs(settings.motion.dt - task.control_dt) > 1e-9:
+            raise BadOption("motion.dt", f"{settings.motion.dt} s, but the task acts every {task.control_dt} s")
+
+    def begin(self, observation: Observation) -> Episode:
+        """A new episode; nothing is planned yet."""
+        task, settings = self.task, self.settings
+        if len(task.arms) == 2:
+            hands = TwoHands(task, settings, observation, self.mover)
+            return Episode(hands, BimanualPourProgram(task, self.demonstration, settings, hands))
+        hand = Hand(task.arms[0], task.bodies[0], settings.reactive, Surroundings(task), observation, mover=self.mover)
+        return Episode(hand, PROGRAMS[task.name](task, self.demonstration, settings, hand))
+
+    def act(self, observation: Observation, memory: Episode) -> np.ndarray:
+        """The next action of the program; standing still once it has ended or given up."""
+        memory.hand.observation = observation
+        if memory.actions is not None:
+            try:
+                return next(memory.actions)
+            except StopIteration:
+                memory.ended = PolicyReport(done=True)
+            except PlanFailed as failure:
+                memory.ended = PolicyReport(True, failure.reason, failure.detail)
+            memory.actions = None
+        return memory.hand.still()
+
+    def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
+        """What happened in the episode of one environment of the state."""
+        return replace(state[index].ended, paths=tuple(state[index].program.paths))
