@@ -7,6 +7,7 @@ and from where that ends the next leg too. Not in the paper, which has one goal.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -98,7 +99,7 @@ class Choice(NamedTuple):
         if self.then is None:
             return None
         asked = self.then.plan.asked
-        return Onward(self.then.path, asked.allowed, must=not asked.settings.avoid)
+        return Onward(self.then.path, asked.allowed, must=not math.isinf(asked.settings.stray))
 
 
 def choose(
