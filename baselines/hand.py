@@ -184,7 +184,7 @@ class Hand:
             return
         held, now = self._held, self.tcp_from(self._held.index)
         if held.grasped.gap(now)[0] > LOST:
-            raise PlanFailed("dropped", f"object {held.index} is not where it was in the hand")
+            raise PlanFailed("dropped", f"{self.surroundings.name(held.index)} is not in the hand any more")
         distance, angle = held.guarded.gap(now)
         if distance > SLIP or angle > TURN:
             self._held = held._replace(guarded=now)

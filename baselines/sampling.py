@@ -87,8 +87,10 @@ def joint_way(
     points = search.solved(start, goals, seed)
     if points is None:
         return None
-    out, state = np.ascontiguousarray(points), np.array([float(seed % 2147483646) + 1.0])
-    return out[: shortcut(g, out, len(out), settings.shortcuts, state)].copy()
+    out = np.empty((len(points) + settings.shortcuts + 1, len(start)))  # a line may add a point
+    out[: len(points)] = points
+    state, ends = np.array([float(seed % 2147483646) + 1.0]), np.empty((2, len(start)))
+    return out[: shortcut(g, out, len(points), settings.shortcuts, state, ends)].copy()
 
 
 def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -47,6 +47,10 @@ class Surroundings:
         """The contacts that are wanted from now on, besides those that nobody needs to look at."""
         self.allowed = (*self._task.touching, *contacts)
 
+    def name(self, index: int) -> str:
+        """Of an object."""
+        return self._task.objects[index].name
+
     def keep(self, margin: float) -> None:
         """The distance [m] to keep from objects and furniture from now on."""
         self._margin = margin

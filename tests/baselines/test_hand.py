@@ -71,7 +71,7 @@ def test_what_is_lost_ends_the_motion_as_dropped(hand):
     actions = hand.follow(upwards(hand))
     next(actions)
     hand.observation = observed(hand, Pose.from_position_quaternion([0.0, 0.0, LOST + 0.005]) @ GRASP)
-    with pytest.raises(PlanFailed, match="object 0 is not where it was") as failed:
+    with pytest.raises(PlanFailed, match="block0 is not in the hand") as failed:
         for _ in range(GLANCE):
             next(actions)
     assert failed.value.reason == "dropped"
