@@ -27,7 +27,7 @@ CLOSE = 5e-4
 """Screw distance to the goal at which it has arrived: [m], and a fifth of it in radians."""
 LEAST_ROOM = 1e-3
 """Room [m] below which an obstacle counts as no nearer: the direction to it must stay."""
-LONGER = 2.0
+LONGER = 3.0
 """Time until it is given up, over the demonstration's."""
 
 

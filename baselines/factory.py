@@ -35,6 +35,7 @@ POLICIES = {
     "screw-no-repet": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False}),
     "screw-no-guard": PolicyKind(ScrewSettings, ScrewPolicy, {"guard": False}),
     "screw-ee-only": PolicyKind(ScrewSettings, ScrewPolicy, {"whole_arm": False}),
+    "tsia": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False, "guard": False}),
     "decoupled": PolicyKind(DecoupledSettings),
     "replay": PolicyKind(ReplaySettings),
     "dmp-goal": PolicyKind(DmpGoalSettings),

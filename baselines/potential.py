@@ -39,9 +39,9 @@ class FieldSettings:
         patience: steps that it may take more than the reference has poses.
     """
 
-    pull: float = 0.1
+    pull: float = 0.2
     strength: float = 3e-4
-    influence: float = 0.08
+    influence: float = 0.1
     fade: float = 0.05
     most: float = 0.005
     patience: int = 200
