@@ -162,7 +162,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
 
     monkeypatch.setattr("onedemo.envs.sim.compiled_scene", missing)
     monkeypatch.chdir(tmp_path)
-    code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1")
+    code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1", "executor=serial")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
     assert "the library libGL.so.1 is missing" in err
     assert "apt install libgl1 libglib2.0-0" in err
@@ -171,7 +171,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
         raise ImportError("cannot import name 'x'")
 
     monkeypatch.setattr("onedemo.envs.sim.compiled_scene", broken)
-    monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1"])
+    monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1", "executor=serial"])
     with pytest.raises(ImportError, match="cannot import name"):
         main()
 
