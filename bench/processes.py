@@ -66,11 +66,11 @@ class Processes:
 
     Args:
         log: file that takes what they print; None: nothing does.
-        command: starts one.
+        command: starts one; None: `WORKER`.
     """
 
-    def __init__(self, log: Path | None = None, command: Sequence[str] = WORKER):
-        self._log, self._command = log, command
+    def __init__(self, log: Path | None = None, command: Sequence[str] | None = None):
+        self._log, self._command = log, command or WORKER
 
     def hire(self) -> Worker:
         """Start a process."""
