@@ -12,7 +12,7 @@ from ..configs.schema import Grid
 from ..planner.errors import BadConfig, OneDemoError
 from .board import Board
 from .dispatch import Answer, Executor, Job, Outcome
-from .records import HUNG, EpisodeRecord, RecordWriter, known_record
+from .records import HUNG, WORKER_DIED, EpisodeRecord, RecordWriter, known_record
 from .run_folder import LOG, WHOLE, Shard, alone, recorded
 from .scenarios import Suite, frozen, lists_of, read_suite, scenarios_of
 from .workshop import lost_record
@@ -133,7 +133,8 @@ class Comparison:
         config = RunConfig.model_validate(outcome.job["cell"])
         cell = f"in the cell {self.grid.label(config)}"
         if outcome.answer is None:
-            raise WorkerFailed(f"{self.folder / LOG}: a worker {outcome.lost.replace('_', ' ')} twice, {cell}")
+            how = "died" if outcome.lost == WORKER_DIED else "hung"
+            raise WorkerFailed(f"{self.folder / LOG}: a worker {how} twice, {cell}")
         if "crash" in outcome.answer:
             raise WorkerFailed(f"{self.folder / LOG}: {outcome.answer['crash']}, {cell}")
         if "refused" in outcome.answer:

@@ -118,10 +118,14 @@ class Dispatcher:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.dismiss()
+        self.crew.close()
+
+    def dismiss(self) -> None:
+        """End all workers; the next job is for new ones."""
         for desk in self._desks:
             self.crew.end(desk.worker)
         self._desks.clear()
-        self.crew.close()
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
         """The outcomes, as they come."""

@@ -53,7 +53,7 @@ def executor_for(settings: RunSettings, jobs: int, log: Path | None) -> Executor
         return Dispatcher(Processes(log), workers, settings.wall_seconds)
     from .ray_actors import RayActors
 
-    crew = RayActors(settings.address, workers)
+    crew = RayActors(settings.address, workers, log)
     return Dispatcher(crew, workers, settings.wall_seconds)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from ..planner.errors import BadConfig
@@ -58,19 +59,21 @@ class RayActors:
     Args:
         address: of a cluster; None: one is started on this machine, and ended with the run.
         workers: processor cores of a cluster that is started.
+        log: file that takes why actors died; None: nothing does.
         workshop: what works in them.
 
     Raises:
         BadConfig: Ray is not installed, or there is no such cluster.
     """
 
-    def __init__(self, address: str | None, workers: int, workshop: type[Workshop] = Bench):
-        self._ray, self._local, self._workshop = _imported(), address is None, workshop
+    def __init__(self, address: str | None, workers: int, log: Path | None = None, workshop: type[Workshop] = Bench):
+        self._ray, self._local, self._workshop, self._log = _imported(), address is None, workshop, log
         options: dict[str, Any] = {"address": address}
         if self._local:
             options = {"num_cpus": workers, "num_gpus": 0, "include_dashboard": False, "_node_ip_address": LOOPBACK}
+        options |= {"log_to_driver": False, "logging_level": "ERROR", "runtime_env": {"env_vars": one_thread()}}
         try:
-            self._ray.init(**options, log_to_driver=False, runtime_env={"env_vars": one_thread()})
+            self._ray.init(**options)
         except (ConnectionError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0]
             raise BadConfig("Ray", "address", f"no cluster at {address or 'this machine'}: {reason}") from None
@@ -109,7 +112,10 @@ class RayActors:
     def _answer(self, promise: Any) -> Answer | None:
         try:
             return self._ray.get(promise)
-        except self._ray.exceptions.RayError:
+        except self._ray.exceptions.RayError as error:
+            if self._log:
+                with self._log.open("a", encoding="utf-8") as file:
+                    file.write(f"{error}\n")
             return None
 
 

@@ -1,6 +1,6 @@
 """A workshop without a simulator: quick, deterministic, and told by FAKE in the environment what to suffer.
 
-FAKE is JSON: `{"pause": seconds, "marks": folder, "faults": {"index": [fault, times]}}`. Run as a script it is a worker.
+FAKE is JSON: `{"pause": seconds, "marks": folder, "faults": {"index": [fault, times]}}`. As a script it is a worker.
 """
 
 from __future__ import annotations

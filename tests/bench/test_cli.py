@@ -81,8 +81,8 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             "task of a pose recording 'stack'; known: , pour",
         ),
         (["demo", "import", "none.csv", "-o", "x.npz", "--rate", "10"], "none.csv: file: does not exist"),
-        (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, pour, pour_real"),
-        (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, pour, pour_real"),
+        (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, compare, headline, pour"),
+        (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, compare, headline, pour"),
         (["run", "some/none.yaml"], "some/none.yaml: no such file"),
         (["run", "stack", "episods=3"], "command line: episods: unknown key; did you mean 'episodes'?"),
         (["run", "stack", "task=juggle"], "task: unknown task 'juggle'; known: stack, pour"),
@@ -105,7 +105,10 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         ),
         (["perf", "--only"], "Option '--only' requires an argument"),
         (["perf", "now"], "Got unexpected extra argument(s) (now); usage: onedemo perf"),
-        (["perf", "--only", "warp"], "unknown group or line of perf 'warp'; known: controller, planner, step, process"),
+        (
+            ["perf", "--only", "warp"],
+            "unknown group or line of perf 'warp'; known: controller, planner, step, run, process",
+        ),
         (["perf", "--json", "no/x.json"], "--json: no/x.json cannot be written: there is no folder no"),
         (["demo", "import", "x.csv"], "Missing option '--output' / '-o'; usage: onedemo demo import"),
         (["demo", "import", "x.csv", "-o", "y.npz", "--rate", "soon"], "Invalid value for '--rate'"),
@@ -218,7 +221,7 @@ def test_perf_runs_what_matches_and_nothing_else(monkeypatch, capsys, tmp_path):
     assert [(row["name"], row["value"], row["goal"], row["ok"]) for row in rows] == [(n, 1.0, 2.0, True) for n in ran]
     ran.clear()
     assert called(monkeypatch, capsys, "perf", "--only", "process")[0] == 0
-    assert ran == [perf.MEMORY, perf.IMPORT, perf.START]
+    assert ran == [perf.MEMORY, perf.IMPORT, perf.START, perf.HELP]
 
 
 def test_a_file_that_cannot_be_written_after_all_is_one_line(monkeypatch, capsys, tmp_path):

@@ -151,7 +151,7 @@ def test_parts_make_the_whole(tmp_path):
 
 @pytest.mark.parametrize("text", ["0/2", "3/2", "1", "a/b", "1/0", "-1/2", "1/2/3", "1.5/2", ""])
 def test_a_part_that_there_is_not_is_refused(text):
-    with pytest.raises(BadConfig, match="--shard: .* is not i/n with i from 1 to n, like 2/4"):
+    with pytest.raises(BadConfig, match=r"--shard: .* is not i/n with i from 1 to n, like 2/4"):
         parsed_shard(text)
 
 
