@@ -95,6 +95,16 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["run", "stack", "settings.motion.guide=2", "episodes=1"], "guide"),
         (["run", "stack", "settings.trim=soon", "episodes=1"], "trim"),
         (["run", "stack", "level=L9"], "command line: level"),
+        (["run", "stack", "--shard", "3/2"], "command line: --shard: '3/2' is not i/n with i from 1 to n, like 2/4"),
+        (
+            ["run", "stack", "env.blocks=3"],
+            "command line: env.blocks: onedemo/Stack-v0 has no such argument; allowed: ",
+        ),
+        (["run", "stack", "sweep.level=[L1, L7]", "level=L8"], "command line: level: unknown level 'L8'"),
+        (
+            ["run", "headline", "sweep.task=[stack, juggle]", "method=screw"],
+            "demonstration: is missing (in the cell tas",
+        ),
         (["fly"], "No such command 'fly'; onedemo knows: run, plan, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
@@ -282,3 +292,26 @@ def test_control_c_keeps_finished_episodes(tmp_path):
     records, foreign = read_records(file)
     assert len(records) >= 1
     assert foreign == []
+
+
+def test_a_comparison_runs_in_processes_and_is_not_run_again(tmp_path):
+    config = tmp_path / "pair.yaml"
+    config.write_text(
+        "name: pair\ntask: stack\ndemonstration: stack\nepisodes: 2\nmax_seconds: 2\n"
+        "sweep: {settings.motion.guide: [0.2, 0.5]}\n"
+    )
+    first = onedemo("run", config, "workers=2", "-o", tmp_path / "runs")
+    assert first.returncode == 0, first.stderr
+    folder = Path(first.stdout.strip().splitlines()[-1])
+    assert "stack Panda L1 screw settings.motion.guide=0.2: 0 of 2 succeeded" in first.stdout
+    assert "settings.motion.guide=0.5: 0 of 2 succeeded" in first.stderr, "a line for each cell when it is complete"
+    lines = (folder / "episodes.jsonl").read_bytes()
+    again = onedemo("run", folder / "config.yaml", "-o", tmp_path / "runs", "--quiet")
+    assert (again.stdout, again.stderr) == (f"{folder}\n", ""), "the config in the folder is the config of the run"
+    assert (folder / "episodes.jsonl").read_bytes() == lines
+
+
+def test_the_schema_is_printed_for_editors(monkeypatch, capsys):
+    code, out, _ = called(monkeypatch, capsys, "schema")
+    assert code == 0
+    assert "sweep" in json.loads(out)["properties"]
