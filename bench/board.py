@@ -55,7 +55,7 @@ class Board:
             self._count(record)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Progress(*columns, console=self._console, transient=True) as self._progress:
-            self._all = self._progress.add_task("all", total=len(mine), completed=len(before))
+            self._all = self._progress.add_task("all cells", total=len(mine), completed=len(before))
             yield
 
     def add(self, record: EpisodeRecord) -> None:

@@ -30,6 +30,7 @@ def run(
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Where run folders are made.")] = Path("runs"),
     shard: Annotated[str | None, typer.Option(help="Only part i of n of the episodes, as i/n.")] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Run again what was lost with its worker.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the run folder, and errors.")] = False,
 ) -> None:
     """Run the episodes of a config, a whole comparison or a single cell, and write a report.
@@ -54,7 +55,7 @@ def run(
     """
     from .run import run_config
 
-    raise typer.Exit(run_config(config, overrides or [], output, shard=shard, quiet=quiet))
+    raise typer.Exit(run_config(config, overrides or [], output, shard=shard, retry=retry, quiet=quiet))
 
 
 @app.command()

@@ -32,12 +32,13 @@ class Comparison:
     Args:
         grid: the cells.
         folder: of the run; held by this process.
-        shard: the part of it that is run here.
         board: where progress is shown.
+        shard: the part of it that is run here.
+        retry: run again what was lost with its worker.
     """
 
-    def __init__(self, grid: Grid, folder: Path, board: Board, shard: Shard = WHOLE):
-        self.grid, self.folder, self.shard, self.board = grid, folder, shard, board
+    def __init__(self, grid: Grid, folder: Path, board: Board, shard: Shard = WHOLE, *, retry: bool = False):
+        self.grid, self.folder, self.shard, self.board, self.retry = grid, folder, shard, board, retry
 
     def complete(self, executor: Executor) -> Records:
         """Draw the scenarios if that has not been done, run what is missing; all episodes that are finished.
@@ -56,6 +57,8 @@ class Comparison:
         records, notes = recorded(self.folder, self.grid.cells, suite)
         for note in notes:
             self.board.warn(note)
+        if self.retry:
+            records = {key: record for key, record in records.items() if not record.lost}
         todo = self.missing(suite, records)
         if records:
             self.board.say(f"{len(records)} of {len(self.mine(suite))} episodes were done before")

@@ -68,8 +68,8 @@ def _efficiency(name: str, crew: Crew) -> Row:
                 busy.append(sum(record.wall_seconds for record in records) / seconds[count][-1] / count)
     one, two = (statistics.median(seconds[count]) for count in (1, 2))
     note = (
-        f"{two / BATCH * 1e3:.0f} ms against {one / BATCH * 1e3:.0f} ms: efficiency {one / two / 2:.2f}, on idle cores; "
-        f"workers are in an episode {statistics.median(busy):.0%} of the time"
+        f"{two / BATCH * 1e3:.0f} ms against {one / BATCH * 1e3:.0f} ms: efficiency {one / two / 2:.2f}, on idle "
+        f"cores; workers are in an episode {statistics.median(busy):.0%} of the time"
     )
     return row(name, 2.0 * two / one, "ratio", 1 / 0.9, note)
 

@@ -89,6 +89,11 @@ class EpisodeRecord:
         return self.cell, self.index
 
     @property
+    def lost(self) -> bool:
+        """Whether nobody knows how the episode would have ended, because its worker died or hung."""
+        return self.failure_reason in (WORKER_DIED, HUNG) and self.seconds == 0.0
+
+    @property
     def safe_success(self) -> bool:
         """Success without any unwanted contact."""
         return self.success and self.safe

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ..configs.schema import Grid, load_grid
+from ..configs.schema import load_grid
 from ..configs.shipped import shipped_config
 from ..planner.errors import BadConfig
 from .board import Board
@@ -22,7 +22,6 @@ from .files import write_whole
 from .run_folder import (
     LOG,
     WHOLE,
-    Shard,
     describe,
     merge,
     open_folder,
@@ -38,7 +37,13 @@ SHIPPED_FOLDERS = (".", os.path.join("configs", "bench"))
 
 
 def run_config(
-    config: str, overrides: list[str], output: Path, *, shard: str | None = None, quiet: bool = False
+    config: str,
+    overrides: list[str],
+    output: Path,
+    *,
+    shard: str | None = None,
+    retry: bool = False,
+    quiet: bool = False,
 ) -> int:
     """Run a config and write its folder; returns the exit code.
 
@@ -47,6 +52,7 @@ def run_config(
         overrides: `key=value` changes.
         output: where the run folder is made.
         shard: part i of n of the episodes, as "i/n"; None: all of them.
+        retry: run again the episodes that were lost with their workers.
         quiet: print only the folder, and errors.
 
     Raises:
@@ -62,7 +68,7 @@ def run_config(
         with ExitStack() as held:
             open_folder(folder, held, part.name)
             describe(grid, folder, shlex.join(["onedemo", "run", config, *overrides]))
-            lines = _completed(grid, folder, part, err)
+            lines = _completed(Comparison(grid, folder, Board(grid, err), part, retry=retry), err)
     except KeyboardInterrupt:
         err.print(f"stopped; finished episodes are kept in {folder}, running the same again goes on")
         return INTERRUPTED
@@ -88,9 +94,9 @@ def config_path(config: str) -> Path:
     raise BadConfig(path, "", "no such file")
 
 
-def _completed(grid: Grid, folder: Path, shard: Shard, err: Any) -> list[str]:
+def _completed(comparison: Comparison, err: Any) -> list[str]:
     """Run what is missing, and report if nothing is; the lines for the terminal."""
-    comparison = Comparison(grid, folder, Board(grid, err), shard)
+    grid, folder, shard = comparison.grid, comparison.folder, comparison.shard
     episodes = sum(cell.episodes for cell in grid.cells)
     with executor_for(grid.settings, episodes, folder / LOG) as executor:
         comparison.complete(executor)

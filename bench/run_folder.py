@@ -158,8 +158,8 @@ def recorded(
                 notes.append(f"{file}, line {number}: not an episode record, skipped")
             elif known.get(record.key) != record.scenario:
                 notes.append(f"{file}, line {number}: an episode of another run, skipped")
-            else:
-                records.setdefault(record.key, record)
+            elif record.key not in records or records[record.key].lost:
+                records[record.key] = record
         if number := torn_line(file):
             notes.append(f"{file}, line {number}: torn, its episode is run again")
     return records, notes

@@ -38,13 +38,13 @@ def dispatcher(workers=2, wall_seconds=60.0, log=None):
     return Dispatcher(Processes(log, COMMAND), workers, wall_seconds)
 
 
-def completed(grid, folder, executor, shard=WHOLE):
+def completed(grid, folder, executor, shard=WHOLE, **options):
     """The records of a comparison that is run in a folder."""
     with ExitStack() as held:
         open_folder(folder, held, shard.name)
         describe(grid, folder, "a test")
         held.enter_context(executor)
-        return Comparison(grid, folder, Board(grid, console(stderr=True)), shard).complete(executor)
+        return Comparison(grid, folder, Board(grid, console(stderr=True)), shard, **options).complete(executor)
 
 
 if __name__ == "__main__":

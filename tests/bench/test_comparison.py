@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import random
+import resource
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 from fake_runs import completed, grid_in
@@ -152,6 +154,21 @@ def test_environments_of_a_worker_are_few(monkeypatch, tmp_path):
         assert len(bench._environments) <= 2
     assert len(set(map(id, seen))) == 3, "levels share an environment"
     bench.close()
+
+
+@pytest.mark.slow
+def test_five_hundred_episodes_leave_nothing_in_memory(tmp_path):
+    grid = grid_in(tmp_path, GRID.replace("max_seconds: 3", "max_seconds: 0.3").replace("episodes: 2", "episodes: 125"))
+    bench, sizes = Bench(), []
+    for k in range(125):
+        for cell in grid.cells:
+            values = cell.model_dump(mode="json")
+            (drawn,) = bench.do({"kind": "draw", "cell": values, "indices": [k]})["drawn"]
+            job = {"kind": "episode", "cell": values, "index": k, "start": drawn["start"], "scenario": ""}
+            assert "record" in bench.do(job)
+        sizes.append(int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20)
+    # what is drawn at a new level for the first time is warm after some of them
+    assert sizes[-1] - sizes[40] < 1.0
 
 
 def test_no_room_is_a_scenario_that_cannot_be_drawn(monkeypatch, tmp_path):

@@ -66,8 +66,11 @@ def test_a_second_time_is_a_record_that_says_so(fault, reason, tmp_path, monkeyp
     assert "twice" in record.detail
     assert "twice; see workers.log" in capsys.readouterr().err
     assert (record.cell, record.scenario) != ("", "")
-    # it is a finished episode: it is not run again
-    assert completed(grid, tmp_path / "run", dispatcher(2)) == records
+    assert completed(grid, tmp_path / "run", dispatcher(2)) == records, "it is a finished episode: not run again"
+    again = completed(grid, tmp_path / "run", dispatcher(2), retry=True)
+    assert {key: each.numbers for key, each in again.items()} == expected(grid)
+    assert completed(grid, tmp_path / "run", dispatcher(2)) == again, "the better one counts"
+    assert len((tmp_path / "run" / "episodes.jsonl").read_bytes().splitlines()) == 13
 
 
 def test_a_worker_that_cannot_work_ends_the_run_in_one_line(tmp_path, monkeypatch):
