@@ -9,13 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from . import demo_commands
-from .console import console, labeled
+from .console import console, labeled, missing_library
 
 BAD_INPUT, INTERRUPTED = 2, 130
 USAGE: Any = typer.BadParameter.__base__
 """What typer raises for a wrong command line; of typer itself or of click, as the version has it."""
-NO_LIBRARY = "cannot open shared object file"
-PACKAGES = "apt install libgl1 libglib2.0-0"
 app = typer.Typer(
     help="One demonstration in, a robot policy out, and a benchmark that proves it.\n\nStart with: onedemo run stack",
     no_args_is_help=True,
@@ -31,24 +29,33 @@ def run(
     config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped config, like stack.")],
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Where run folders are made.")] = Path("runs"),
+    shard: Annotated[str | None, typer.Option(help="Only part i of n of the episodes, as i/n.")] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Run again what was lost with its worker.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the run folder, and errors.")] = False,
 ) -> None:
-    """Run episodes of a config and write a report, a figure and a video.
+    """Run the episodes of a config, a whole comparison or a single cell, and write a report.
 
-    Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
+    Keys of a cell: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
     video, settings. Keys with dots reach into settings: settings.motion.guide=0.2
 
-    Finished episodes are kept: running the same config again goes on where it stopped. The last line on
-    standard output is the run folder.
+    A comparison has lists of values under sweep, and may have defaults and exclude; a change of a swept key takes the
+    place of its values. How it is run: executor (process, serial, ray), workers, address, wall_seconds.
+
+    Finished episodes are kept, whatever happens: running the same config again goes on where it stopped. The last
+    line on standard output is the run folder.
 
     Examples:
     - onedemo run stack
 
     - onedemo run configs/bench/stack.yaml episodes=50 level=L2 seed=1000
+
+    - onedemo run headline method=screw workers=8
+
+    - onedemo run headline --shard 2/16
     """
     from .run import run_config
 
-    raise typer.Exit(run_config(config, overrides or [], output, quiet=quiet))
+    raise typer.Exit(run_config(config, overrides or [], output, shard=shard, retry=retry, quiet=quiet))
 
 
 @app.command()
@@ -116,6 +123,19 @@ def tasks(
 
 
 @app.command()
+def schema() -> None:
+    """Print the JSON schema of configs, for editors.
+
+    Example: onedemo schema > onedemo.schema.json
+    """
+    import json
+
+    from ..configs.cell import json_schema
+
+    console().print(json.dumps(json_schema(), indent=2))
+
+
+@app.command()
 def version() -> None:
     """Print the version."""
     from importlib.metadata import version as installed
@@ -151,10 +171,9 @@ def main() -> None:
     except OneDemoError as error:
         reason, code = str(error), BAD_INPUT
     except (ImportError, OSError) as error:
-        if NO_LIBRARY not in str(error):
+        reason, code = missing_library(error), BAD_INPUT
+        if not reason:
             raise
-        library = str(error).partition(":")[0]
-        reason, code = f"the library {library} is missing, which OpenCV in robosuite loads: {PACKAGES}", BAD_INPUT
     if reason:
         console(stderr=True).print(labeled("error", "red", reason))
     sys.exit(code)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from ..planner.errors import BadConfig
 
 COMMAND_LINE = "command line"
+NO_LIBRARY = "cannot open shared object file"
+PACKAGES = "apt install libgl1 libglib2.0-0"
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,6 +31,14 @@ def labeled(label: str, style: str, text: str) -> Text:
     from rich.text import Text
 
     return Text.assemble((label, style), f"  {text}")
+
+
+def missing_library(error: BaseException) -> str:
+    """What to install, if an error says that a shared library is missing; else ""."""
+    if not isinstance(error, ImportError | OSError) or NO_LIBRARY not in str(error):
+        return ""
+    library = str(error).partition(":")[0]
+    return f"the library {library} is missing, which OpenCV in robosuite loads: {PACKAGES}"
 
 
 def check_writable(option: str, path: Path) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import statistics
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from fnmatch import fnmatch
@@ -18,6 +20,7 @@ from .console import check_writable, console, labeled, writing
 from .measuring import Row, row, seconds_per_call
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
 from .perf_planner import LINES
+from .perf_runs import RUN_LINES
 from .perf_tasks import TASK_LINES, started
 
 TICK = "controller tick from Python / DQ_Robotics"
@@ -26,6 +29,7 @@ PEER_STEP = "Stack step / robosuite's own step"
 MEMORY = "second environment in a process"
 IMPORT = "import onedemo.envs"
 START = "warm start to the first moving step"
+HELP = "onedemo --help"
 
 
 def _panda() -> tuple[Any, np.ndarray, np.ndarray]:
@@ -124,6 +128,16 @@ def _start() -> Row:
     return row(START, _measured(_START), "s", 10.0, "a new process, compiled kernels cached")
 
 
+def _help() -> Row:
+    run = [sys.executable, "-c", "from onedemo.bench.cli import main; main()", "--help"]
+    seconds = []
+    for _ in range(7):
+        begun = time.perf_counter()
+        subprocess.run(run, capture_output=True, check=True)
+        seconds.append(time.perf_counter() - begun)
+    return row(HELP, statistics.median(seconds), "s", 0.5, "a new process")
+
+
 def _measured(code: str) -> float:
     """The number that a Python program prints last."""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -135,7 +149,8 @@ GROUPS: dict[str, Lines] = {
     "controller": {TICK: _tick, KINEMATICS: _kinematics},
     "planner": LINES,
     "step": {**TASK_LINES, PEER_STEP: _peer_step},
-    "process": {MEMORY: _memory, IMPORT: _import, START: _start},
+    "run": RUN_LINES,
+    "process": {MEMORY: _memory, IMPORT: _import, START: _start, HELP: _help},
 }
 """Per group its lines: what is measured, and how."""
 

@@ -8,13 +8,20 @@ import os
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from ..planner.errors import OneDemoError
 
 FILE = "episodes.jsonl"
+FORMAT = 1
+"""Of the lines of a file; a line of another one is foreign."""
+TIMINGS = ("wall_seconds", "tick_us")
+"""What is not part of the result: it differs from run to run."""
+ERROR, WORKER_DIED, HUNG = "error", "worker_died", "timeout"
+"""Reasons of failure that are not the task's: the policy raised an exception; the process that ran the episode died
+twice; or it had to be ended twice, because the episode took too much real time."""
 
 
 class RunBusy(OneDemoError):
@@ -49,6 +56,9 @@ class EpisodeRecord:
         numbers: the task's own, as in `info`, each a list.
         wall_seconds: real time; not part of the result.
         tick_us: median, 99th percentile and largest time of the policy per tick [us]; not part of the result.
+            Zeros where the episode was lost with its worker.
+        cell: digest of the cell's config.
+        scenario: fingerprint of the scenario.
     """
 
     index: int
@@ -70,6 +80,18 @@ class EpisodeRecord:
     numbers: dict[str, list[float]]
     wall_seconds: float
     tick_us: list[float]
+    cell: str = ""
+    scenario: str = ""
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """What an episode is known by in a run: its cell and its scenario's index."""
+        return self.cell, self.index
+
+    @property
+    def lost(self) -> bool:
+        """Whether nobody knows how the episode would have ended, because its worker died or hung."""
+        return self.failure_reason in (WORKER_DIED, HUNG) and self.seconds == 0.0
 
     @property
     def safe_success(self) -> bool:
@@ -77,25 +99,52 @@ class EpisodeRecord:
         return self.success and self.safe
 
 
+def known_record(values: dict[str, Any]) -> EpisodeRecord:
+    """The record of a mapping; keys that came later than the mapping have their default.
+
+    Raises:
+        ValueError: a key that no record has, or one that every record has is missing.
+    """
+    names = {field.name for field in fields(EpisodeRecord)}
+    needed = {field.name for field in fields(EpisodeRecord) if field.default is field.default_factory is MISSING}
+    if not needed <= set(values) <= names:
+        raise ValueError(f"not the keys of a record: {sorted(set(values) ^ names)}")
+    return EpisodeRecord(**values)
+
+
+def result_of(record: EpisodeRecord) -> dict[str, Any]:
+    """The record without what differs from run to run."""
+    return {key: value for key, value in asdict(record).items() if key not in TIMINGS}
+
+
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the run folder for one process.
+def locked(folder: Path, part: str = "") -> Iterator[None]:
+    """Hold the run folder for one process, or for one per part of it.
 
     Raises:
         RunBusy: another process holds it.
     """
-    with (folder / ".lock").open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise RunBusy(folder) from None
-        yield
+    with (folder / ".lock").open("w") as whole:
+        _hold(whole, folder, shared=bool(part))
+        if not part:
+            yield
+            return
+        with (folder / f".lock-{part}").open("w") as own:
+            _hold(own, folder, shared=False)
+            yield
+
+
+def _hold(file: IO[str], folder: Path, *, shared: bool) -> None:
+    try:
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RunBusy(folder) from None
 
 
 def encoded(record: EpisodeRecord) -> bytes:
     """One line: the record with a check sum."""
     body = json.dumps(asdict(record), sort_keys=True, separators=(",", ":"))
-    return f'{{"crc":{zlib.crc32(body.encode())},"record":{body}}}\n'.encode()
+    return f'{{"crc":{zlib.crc32(body.encode())},"format":{FORMAT},"record":{body}}}\n'.encode()
 
 
 def decoded(line: bytes) -> EpisodeRecord | None:
@@ -104,24 +153,36 @@ def decoded(line: bytes) -> EpisodeRecord | None:
         outer: Any = json.loads(line)
         body, crc = outer["record"], outer["crc"]
         text = json.dumps(body, sort_keys=True, separators=(",", ":"))
-        if zlib.crc32(text.encode()) != crc or set(body) != {field.name for field in fields(EpisodeRecord)}:
+        if outer["format"] != FORMAT or zlib.crc32(text.encode()) != crc:
             return None
-        return EpisodeRecord(**body)
+        return known_record(body)
     except (ValueError, TypeError, KeyError):
         return None
 
 
-def read_records(path: Path) -> tuple[list[EpisodeRecord], list[int]]:
-    """All records of a file, and the numbers (from 1) of lines that are none.
+def read_lines(path: Path) -> list[tuple[int, EpisodeRecord | None]]:
+    """Number (from 1) of every complete line of a file, and its record; None for one that is none.
 
-    A last line without its end is what a crash leaves behind: it is not counted as foreign.
+    A last line without its end is what a crash leaves behind: it is none of them; see `torn_line`.
     """
     if not path.exists():
-        return [], []
+        return []
     *lines, _torn = path.read_bytes().split(b"\n")
-    records = [decoded(line) for line in lines]
-    foreign = [number for number, record in enumerate(records, 1) if record is None]
-    return [record for record in records if record is not None], foreign
+    return [(number, decoded(line)) for number, line in enumerate(lines, 1)]
+
+
+def read_records(path: Path) -> tuple[list[EpisodeRecord], list[int]]:
+    """All records of a file, and the numbers (from 1) of lines that are none."""
+    lines = read_lines(path)
+    return [record for _, record in lines if record], [number for number, record in lines if record is None]
+
+
+def torn_line(path: Path) -> int:
+    """Number (from 1) of a last line that a crash tore; 0 if there is none."""
+    if not path.exists():
+        return 0
+    *lines, torn = path.read_bytes().split(b"\n")
+    return len(lines) + 1 if torn else 0
 
 
 class RecordWriter:

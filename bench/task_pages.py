@@ -76,12 +76,12 @@ def write_clip(task: str, file: Path) -> Path:
     from ..configs.schema import load_config
     from ..configs.shipped import shipped_config
     from .episode import run_episode
-    from .run import prepared
     from .scenarios import scenarios_of
+    from .workshop import made, policy_for
 
-    source = shipped_config(task)
-    config = load_config(source)
-    env, policy = prepared(config, source, [])
+    config = load_config(shipped_config(task))
+    env = made(config, "rgb_array")
+    policy = policy_for(env, config)
     pictures: list[Any] = []
     with writing("--write", file):
         run_episode(

@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from ..planner.errors import BadAction, BadOption, UnknownName
+from ..planner.errors import BadAction, BadOption, NoRoom, UnknownName
 from ..planner.pose import Pose
 from ..planner.shapes import Obstacle as Solid
 from . import spaces as space
@@ -147,7 +147,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             if intruders is not None:
                 return start._replace(intruders=intruders)
             self._refused += 1
-        raise BadOption("obstacles", f"no room for {wanted!r} obstacles beside this start")
+        raise NoRoom(wanted)
 
     def _intruders(self, kind: str, start: Start) -> tuple[Intruder, ...] | None:
         if kind == "none":

@@ -88,6 +88,14 @@ class BadOption(OneDemoError, ValueError):
         super().__init__(f"option {option!r}: {reason}")
 
 
+class NoRoom(BadOption):
+    """None of the starts that were drawn has room for the obstacles."""
+
+    def __init__(self, kind: object):
+        self.kind = kind
+        super().__init__("obstacles", f"no room for {kind!r} obstacles beside this start")
+
+
 class BadAction(OneDemoError, ValueError):
     """An action has the wrong shape or is not finite."""
 

@@ -81,8 +81,8 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             "task of a pose recording 'stack'; known: , pour",
         ),
         (["demo", "import", "none.csv", "-o", "x.npz", "--rate", "10"], "none.csv: file: does not exist"),
-        (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, pour, pour_real"),
-        (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, pour, pour_real"),
+        (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, compare, headline, pour"),
+        (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, compare, headline, pour"),
         (["run", "some/none.yaml"], "some/none.yaml: no such file"),
         (["run", "stack", "episods=3"], "command line: episods: unknown key; did you mean 'episodes'?"),
         (["run", "stack", "task=juggle"], "task: unknown task 'juggle'; known: stack, pour"),
@@ -95,6 +95,16 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["run", "stack", "settings.motion.guide=2", "episodes=1"], "guide"),
         (["run", "stack", "settings.trim=soon", "episodes=1"], "trim"),
         (["run", "stack", "level=L9"], "command line: level"),
+        (["run", "stack", "--shard", "3/2"], "command line: --shard: '3/2' is not i/n with i from 1 to n, like 2/4"),
+        (
+            ["run", "stack", "env.blocks=3"],
+            "command line: env.blocks: onedemo/Stack-v0 has no such argument; allowed: ",
+        ),
+        (["run", "stack", "sweep.level=[L1, L7]", "level=L8"], "command line: level: unknown level 'L8'"),
+        (
+            ["run", "headline", "sweep.task=[stack, juggle]", "method=screw"],
+            "demonstration: is missing (in the cell tas",
+        ),
         (["fly"], "No such command 'fly'; onedemo knows: run, plan, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
@@ -105,7 +115,10 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         ),
         (["perf", "--only"], "Option '--only' requires an argument"),
         (["perf", "now"], "Got unexpected extra argument(s) (now); usage: onedemo perf"),
-        (["perf", "--only", "warp"], "unknown group or line of perf 'warp'; known: controller, planner, step, process"),
+        (
+            ["perf", "--only", "warp"],
+            "unknown group or line of perf 'warp'; known: controller, planner, step, run, process",
+        ),
         (["perf", "--json", "no/x.json"], "--json: no/x.json cannot be written: there is no folder no"),
         (["demo", "import", "x.csv"], "Missing option '--output' / '-o'; usage: onedemo demo import"),
         (["demo", "import", "x.csv", "-o", "y.npz", "--rate", "soon"], "Invalid value for '--rate'"),
@@ -162,7 +175,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
 
     monkeypatch.setattr("onedemo.envs.sim.compiled_scene", missing)
     monkeypatch.chdir(tmp_path)
-    code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1")
+    code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1", "executor=serial")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
     assert "the library libGL.so.1 is missing" in err
     assert "apt install libgl1 libglib2.0-0" in err
@@ -171,7 +184,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
         raise ImportError("cannot import name 'x'")
 
     monkeypatch.setattr("onedemo.envs.sim.compiled_scene", broken)
-    monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1"])
+    monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1", "executor=serial"])
     with pytest.raises(ImportError, match="cannot import name"):
         main()
 
@@ -218,7 +231,7 @@ def test_perf_runs_what_matches_and_nothing_else(monkeypatch, capsys, tmp_path):
     assert [(row["name"], row["value"], row["goal"], row["ok"]) for row in rows] == [(n, 1.0, 2.0, True) for n in ran]
     ran.clear()
     assert called(monkeypatch, capsys, "perf", "--only", "process")[0] == 0
-    assert ran == [perf.MEMORY, perf.IMPORT, perf.START]
+    assert ran == [perf.MEMORY, perf.IMPORT, perf.START, perf.HELP]
 
 
 def test_a_file_that_cannot_be_written_after_all_is_one_line(monkeypatch, capsys, tmp_path):
@@ -279,3 +292,26 @@ def test_control_c_keeps_finished_episodes(tmp_path):
     records, foreign = read_records(file)
     assert len(records) >= 1
     assert foreign == []
+
+
+def test_a_comparison_runs_in_processes_and_is_not_run_again(tmp_path):
+    config = tmp_path / "pair.yaml"
+    config.write_text(
+        "name: pair\ntask: stack\ndemonstration: stack\nepisodes: 2\nmax_seconds: 2\n"
+        "sweep: {settings.motion.guide: [0.2, 0.5]}\n"
+    )
+    first = onedemo("run", config, "workers=2", "-o", tmp_path / "runs")
+    assert first.returncode == 0, first.stderr
+    folder = Path(first.stdout.strip().splitlines()[-1])
+    assert "stack Panda L1 screw settings.motion.guide=0.2: 0 of 2 succeeded" in first.stdout
+    assert "settings.motion.guide=0.5: 0 of 2 succeeded" in first.stderr, "a line for each cell when it is complete"
+    lines = (folder / "episodes.jsonl").read_bytes()
+    again = onedemo("run", folder / "config.yaml", "-o", tmp_path / "runs", "--quiet")
+    assert (again.stdout, again.stderr) == (f"{folder}\n", ""), "the config in the folder is the config of the run"
+    assert (folder / "episodes.jsonl").read_bytes() == lines
+
+
+def test_the_schema_is_printed_for_editors(monkeypatch, capsys):
+    code, out, _ = called(monkeypatch, capsys, "schema")
+    assert code == 0
+    assert "sweep" in json.loads(out)["properties"]

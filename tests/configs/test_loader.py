@@ -110,7 +110,7 @@ def test_the_digest_is_of_the_whole_config_and_of_nothing_else(tmp_path):
 def test_shipped_files_are_found_by_name():
     assert isinstance(load_config(shipped_config("stack")), RunConfig)
     assert shipped_demonstration("stack").is_file()
-    with pytest.raises(UnknownName, match="unknown config 'stak'; known: bimanual_pour, pour"):
+    with pytest.raises(UnknownName, match="unknown config 'stak'; known: bimanual_pour, compare, headline"):
         shipped_config("stak")
     with pytest.raises(UnknownName, match="unknown demonstration 'x'; known: pour, shelve, stack"):
         shipped_demonstration("x")

@@ -1,0 +1,62 @@
+"""Where episodes run: in this process, in worker processes, or in Ray's actors. The results are the same bits."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from ..configs.cell import RunSettings
+from .dispatch import Dispatcher, Executor, Job, Outcome
+from .workshop import Bench
+
+
+class Serial:
+    """An executor in this process: nothing is limited in time, and what kills an episode kills the run."""
+
+    workers = 1
+
+    def __init__(self) -> None:
+        self._bench = Bench()
+
+    def __enter__(self) -> Serial:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bench.close()
+
+    def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
+        """The outcomes, in order."""
+        for job in jobs:
+            begun = time.monotonic()
+            yield Outcome(job, self._bench.do(job), "", time.monotonic() - begun)
+
+
+def executor_for(settings: RunSettings, jobs: int, log: Path | None) -> Executor:
+    """The executor that a config names.
+
+    Args:
+        settings: `executor`, `workers`, `address` and `wall_seconds` of them.
+        jobs: how many there will be: no more workers are started.
+        log: file that takes what worker processes print.
+
+    Raises:
+        BadConfig: Ray is wanted, but not installed or not reachable.
+    """
+    if settings.executor == "serial":
+        return Serial()
+    workers = max(1, min(settings.workers or cores(), jobs))
+    if settings.executor == "process":
+        from .processes import Processes
+
+        return Dispatcher(Processes(log), workers, settings.wall_seconds)
+    from .ray_actors import RayActors
+
+    crew = RayActors(settings.address, workers, log)
+    return Dispatcher(crew, workers, settings.wall_seconds)
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))

@@ -1,0 +1,92 @@
+"""Speeds of whole runs: episodes against real time, two workers against one."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from importlib.util import find_spec
+
+from ..configs.cell import RunConfig
+from .dispatch import Crew, Dispatcher, Job
+from .measuring import Row, row
+from .records import known_record
+
+EPISODE = "Stack episode, policy included / real time"
+PROCESSES = "two local workers, per episode / one"
+ACTORS = "two Ray actors, per episode / one"
+CONFIG = RunConfig(name="perf", task="stack", demonstration="stack", video=False)
+SHORT = CONFIG.model_copy(update={"max_seconds": 10.0})
+BATCH, BATCHES = 8, 3
+"""Episodes that are timed together, and how often."""
+
+
+def _jobs(config: RunConfig, count: int) -> list[Job]:
+    """Episodes as a run gives them out."""
+    from .workshop import Bench
+
+    cell = config.model_dump(mode="json")
+    bench = Bench()
+    drawn = bench.do({"kind": "draw", "cell": cell, "indices": list(range(count))})["drawn"]
+    bench.close()
+    base = {"kind": "episode", "cell": cell, "scenario": ""}
+    return [{**base, "index": k, "start": each["start"]} for k, each in enumerate(drawn)]
+
+
+def _episode() -> Row:
+    from .workshop import Bench
+
+    bench, jobs, shares = Bench(), _jobs(CONFIG, 5), []
+    for job in jobs:
+        begun = time.process_time()
+        record = bench.do(job)["record"]
+        shares.append((time.process_time() - begun) / record["seconds"])
+    bench.close()
+    # the first compiles what is left
+    share = statistics.median(shares[1:])
+    note = f"{1.0 / share:.1f} times as fast as real time on one core, physics and planner; processor time"
+    return row(EPISODE, share, "ratio", 1 / 3, note)
+
+
+def _efficiency(name: str, crew: Crew) -> Row:
+    """Two workers against one, both warm; batches in turn, so that noise hits both."""
+    jobs, seconds, busy = _jobs(SHORT, BATCH), {1: [], 2: []}, []
+    executors = {count: Dispatcher(crew, count, 600.0) for count in seconds}
+    with ExitStack() as held:
+        held.callback(crew.close)
+        for executor in executors.values():
+            held.callback(executor.dismiss)
+        for executor in executors.values():
+            list(executor.results(jobs))
+        for _ in range(BATCHES):
+            for count, executor in executors.items():
+                begun = time.perf_counter()
+                done = list(executor.results(jobs))
+                seconds[count].append(time.perf_counter() - begun)
+                records = [known_record((outcome.answer or {})["record"]) for outcome in done]
+                busy.append(sum(record.wall_seconds for record in records) / seconds[count][-1] / count)
+    one, two = (statistics.median(seconds[count]) for count in (1, 2))
+    note = (
+        f"{two / BATCH * 1e3:.0f} ms against {one / BATCH * 1e3:.0f} ms: efficiency {one / two / 2:.2f}, on idle "
+        f"cores; workers are in an episode {statistics.median(busy):.0%} of the time"
+    )
+    return row(name, 2.0 * two / one, "ratio", 1 / 0.9, note)
+
+
+def _processes() -> Row:
+    from .processes import Processes
+
+    return _efficiency(PROCESSES, Processes())
+
+
+def _actors() -> Row:
+    if find_spec("ray") is None:
+        return Row(ACTORS, None, "ratio", 1 / 0.9, None, "needs: pip install 'onedemo[ray]'")
+    from .ray_actors import RayActors
+
+    return _efficiency(ACTORS, RayActors(None, 3))
+
+
+RUN_LINES: dict[str, Callable[[], Row]] = {EPISODE: _episode, PROCESSES: _processes, ACTORS: _actors}
+"""Name of a line: what measures it."""

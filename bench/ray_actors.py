@@ -1,0 +1,126 @@
+"""Workers as actors of Ray, on this machine or on a cluster: each keeps its environments.
+
+Ray's dashboard and its job port let whoever reaches them run code: a local cluster has no dashboard and listens on
+the loopback address; a cluster's address is used only if the user gives one.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ..planner.errors import BadConfig
+from .dispatch import Answer, Job
+from .worker import answered, one_thread
+from .workshop import Bench, Workshop
+
+LOOPBACK = "127.0.0.1"
+
+
+class Actor:
+    """A workshop in a process of Ray's."""
+
+    def __init__(self, workshop: type[Workshop]):
+        self._workshop = workshop()
+
+    def process(self) -> int:
+        """Its id."""
+        return os.getpid()
+
+    def do(self, job: Job) -> Answer:
+        """The answer to a job, whatever happens."""
+        return answered(self._workshop, job)
+
+
+@dataclass(eq=False)
+class Worker:
+    """An actor.
+
+    Attributes:
+        actor: Ray's handle.
+        process: a promise of its process's id.
+        answer: a promise of the answer to its job.
+    """
+
+    actor: Any
+    process: Any
+    answer: Any = None
+
+
+class RayActors:
+    """A crew of actors.
+
+    Args:
+        address: of a cluster; None: one is started on this machine, and ended with the run.
+        workers: processor cores of a cluster that is started.
+        log: file that takes why actors died; None: nothing does.
+        workshop: what works in them.
+
+    Raises:
+        BadConfig: Ray is not installed, or there is no such cluster.
+    """
+
+    def __init__(self, address: str | None, workers: int, log: Path | None = None, workshop: type[Workshop] = Bench):
+        self._ray, self._local, self._workshop, self._log = _imported(), address is None, workshop, log
+        options: dict[str, Any] = {"address": address}
+        if self._local:
+            options = {"num_cpus": workers, "num_gpus": 0, "include_dashboard": False, "_node_ip_address": LOOPBACK}
+        options |= {"log_to_driver": False, "logging_level": "ERROR", "runtime_env": {"env_vars": one_thread()}}
+        try:
+            self._ray.init(**options)
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            reason = str(error).splitlines()[0]
+            raise BadConfig("Ray", "address", f"no cluster at {address or 'this machine'}: {reason}") from None
+        self._actor = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Actor)
+
+    def hire(self) -> Worker:
+        """Start an actor."""
+        actor = self._actor.remote(self._workshop)
+        return Worker(actor, actor.process.remote())
+
+    def ask(self, worker: Worker, job: Job) -> None:
+        """Send a job."""
+        worker.answer = worker.actor.do.remote(job)
+
+    def heard(self, workers: Sequence[Worker], seconds: float) -> list[tuple[Any, Answer | None]]:
+        """The workers that have answered or died, within some seconds."""
+        promises = {worker.answer: worker for worker in workers}
+        ready, _ = self._ray.wait(list(promises), num_returns=1, timeout=seconds)
+        return [(promises[promise], self._answer(promise)) for promise in ready]
+
+    def end(self, worker: Worker) -> None:
+        """Kill an actor; on this machine its process too, which hears nothing while it is stopped."""
+        process = None
+        if self._local:
+            with suppress(self._ray.exceptions.RayError):
+                process = self._ray.get(worker.process, timeout=0)
+        self._ray.kill(worker.actor, no_restart=True)
+        if process is not None:
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+
+    def close(self) -> None:
+        """Leave the cluster; one that was started here is ended."""
+        self._ray.shutdown()
+
+    def _answer(self, promise: Any) -> Answer | None:
+        try:
+            return self._ray.get(promise)
+        except self._ray.exceptions.RayError as error:
+            if self._log:
+                with self._log.open("a", encoding="utf-8") as file:
+                    file.write(f"{error}\n")
+            return None
+
+
+def _imported() -> Any:
+    try:
+        return import_module("ray")
+    except ImportError:
+        raise BadConfig("Ray", "executor", "is not installed: pip install 'onedemo[ray]'") from None

@@ -1,0 +1,235 @@
+"""What a worker does: it keeps environments and policies, and runs in them what it is asked for.
+
+A job and its answer are mappings that JSON can hold, so that any process may do the work:
+
+| job | besides "cell" | answer |
+|---|---|---|
+| "prepare" | | {} |
+| "draw" | "indices" | "drawn": per index a start, or why there is none |
+| "episode" | "index", "start", "scenario" | "record" |
+| "show" | "folder" | what `show` returns |
+
+What the user got wrong, or must know, is answered by {"refused": text, "key": key}.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+import warnings
+from collections import OrderedDict
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ..configs.cell import RunConfig
+from ..planner.errors import BadConfig, BadOption, NoRoom, OneDemoError
+from .records import ERROR, EpisodeRecord
+from .scenarios import Scenario, ScenarioChanged, scenarios_of
+from .tasks import TASKS
+
+if TYPE_CHECKING:
+    from ..baselines.policy import Policy
+
+LOG = logging.getLogger("onedemo")
+MAX_ENVIRONMENTS, MAX_POLICIES = 4, 32
+"""What a worker keeps."""
+Answer = dict[str, Any]
+
+
+class Workshop(Protocol):
+    """Does jobs one after the other."""
+
+    def do(self, job: dict[str, Any]) -> Answer:
+        """The answer to a job."""
+        ...
+
+
+class Bench:
+    """The workshop of real runs."""
+
+    def __init__(self) -> None:
+        self._environments: OrderedDict[str, Any] = OrderedDict()
+        self._policies: OrderedDict[str, Policy] = OrderedDict()
+
+    def do(self, job: dict[str, Any]) -> Answer:
+        """The answer to a job."""
+        config = RunConfig.model_validate(job["cell"])
+        try:
+            env, policy = self.prepared(config)
+            if job["kind"] == "draw":
+                return {"drawn": [draw(env, config, index) for index in job["indices"]]}
+            if job["kind"] == "episode":
+                return {"record": asdict(episode(env, policy, config, job))}
+            if job["kind"] == "show":
+                return shown(policy, config, Path(job["folder"]))
+            return {}
+        except OneDemoError as error:
+            return refusal(error)
+
+    def prepared(self, config: RunConfig) -> tuple[Any, Policy]:
+        """The environment and the policy of a cell, compiled and warm, from the ones that are kept if possible.
+
+        Raises:
+            BadConfig: the config names something wrongly; with its key.
+            BadDemonstration: the demonstration is of something else.
+        """
+        place = environment_key(config)
+        if place not in self._environments:
+            self._environments[place] = made(config)
+            for _ in range(len(self._environments) - MAX_ENVIRONMENTS):
+                self._environments.popitem(last=False)[1].close()
+        self._environments.move_to_end(place)
+        env, own = self._environments[place], f"{place} {config.digest()}"
+        if own not in self._policies:
+            self._policies[own] = policy_for(env, config)
+            for _ in range(len(self._policies) - MAX_POLICIES):
+                self._policies.popitem(last=False)
+        self._policies.move_to_end(own)
+        return env, self._policies[own]
+
+    def close(self) -> None:
+        """Close all environments."""
+        for env in self._environments.values():
+            env.close()
+        self._environments.clear()
+        self._policies.clear()
+
+
+def refusal(error: OneDemoError) -> Answer:
+    """What the user got wrong, with the key of the config if one is to blame."""
+    if isinstance(error, BadOption):
+        return {"refused": error.reason, "key": error.option}
+    return {"refused": str(error), "key": ""}
+
+
+def environment_key(config: RunConfig) -> str:
+    """What environments differ in; the level is given to `reset`."""
+    return repr((config.task, config.robot, config.obstacles, sorted(config.env.items()), config.max_seconds))
+
+
+def made(config: RunConfig, render_mode: str | None = None) -> Any:
+    """The environment of a config."""
+    import gymnasium as gym
+
+    from .. import envs  # noqa: F401  (registers the ids)
+    from ..planner import reactive
+
+    limit = None if config.max_seconds is None else max(1, round(config.max_seconds * 50))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        env: Any = gym.make(
+            TASKS[config.task].id,
+            robot=config.robot,
+            level=config.level,
+            obstacles=config.obstacles,
+            render_mode=render_mode,
+            max_episode_steps=limit,
+            **config.env,
+        )
+    task = env.unwrapped.task
+    for arm, body in zip(task.arms, task.bodies, strict=True):
+        reactive.warm_up(arm, body)
+    return env
+
+
+def policy_for(env: Any, config: RunConfig) -> Policy:
+    """The policy of a config for its environment."""
+    from ..baselines.factory import make_policy
+    from .checks import fitting_demonstration
+
+    return make_policy(config.method, env.unwrapped.task, fitting_demonstration(config), config.settings)
+
+
+def draw(env: Any, config: RunConfig, index: int) -> Answer:
+    """A start of a cell, with how often one was refused; or why there is none."""
+    from .starts import drawn_start
+
+    scenario = scenarios_of(config)[index]
+    try:
+        observation, info = env.reset(seed=scenario.seed, options={"level": scenario.level})
+    except NoRoom as error:
+        return {"infeasible": error.reason}
+    return {"start": drawn_start(env, observation), "refused": int(info["layouts_refused"])}
+
+
+def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) -> EpisodeRecord:
+    """The record of an episode; what the policy raises is a failure of its own.
+
+    Raises:
+        ScenarioChanged: the environment draws another start than the frozen one.
+        BadConfig: the start cannot be drawn.
+    """
+    from .episode import run_episode
+    from .starts import check_start, drawn_start
+
+    scenario, started, checked = scenarios_of(config)[job["index"]], time.perf_counter(), False
+
+    def observer(env: Any, observation: Any) -> None:
+        nonlocal checked
+        if not checked:
+            checked = True
+            check_start(scenario, job["start"], drawn_start(env, observation))
+
+    try:
+        record, _ = run_episode(env, policy, scenario, config, observer)
+    except ScenarioChanged:
+        raise
+    except Exception as error:
+        if not checked:
+            raise BadConfig("config.yaml", "", f"scenario {scenario.index} cannot be drawn: {error}") from None
+        LOG.info("%s, seed %d", config.method, scenario.seed, exc_info=True)
+        detail = f"{type(error).__name__}: {error}"
+        record = lost_record(config, scenario, ERROR, detail, time.perf_counter() - started)
+    return replace(record, cell=config.digest(), scenario=job["scenario"])
+
+
+def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str, seconds: float) -> EpisodeRecord:
+    """What is written of an episode that the simulator could not judge: a failure, not known to be safe."""
+    return EpisodeRecord(
+        index=scenario.index,
+        seed=scenario.seed,
+        method=config.method,
+        task=config.task,
+        robot=config.robot,
+        level=config.level,
+        success=False,
+        safe=False,
+        stage="",
+        failure_reason=reason,
+        detail=" ".join(detail.split())[:300],
+        collision="",
+        seconds=0.0,
+        contacts=0,
+        clearance=None,
+        refused=0,
+        numbers={},
+        wall_seconds=seconds,
+        tick_us=[0.0, 0.0, 0.0],
+        cell=config.digest(),
+    )
+
+
+def shown(policy: Policy, config: RunConfig, folder: Path) -> Answer:
+    """Draw the first scenario; what a report must know of the pictures, or why there is no figure."""
+    try:
+        return show(policy, config, folder)
+    except Exception as error:
+        LOG.info("no figure", exc_info=True)
+        return {"video": config.video, "figure_problem": f"{type(error).__name__}: {error}"}
+
+
+def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
+    """Figure and, if wanted, video of the first scenario in a folder; what a report must know of them."""
+    from .figures import draw_episode
+    from .showcase import watch
+
+    figure, video = folder / "episode0.png", folder / "episode0.mp4"
+    env = made(config, "rgb_array" if config.video else None)
+    try:
+        seen = watch(env, policy, scenarios_of(config)[0], config, video if config.video else None)
+    finally:
+        env.close()
+    title = f"{config.task}, {config.robot}, {config.level}, seed {config.seed}: one demonstration, {config.method}"
+    draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
+    return {"speed": seen.speed, "video": config.video, "video_problem": seen.video_problem}

@@ -1,0 +1,136 @@
+"""What a benchmark config may hold: one cell of a comparison, and how the whole of it is run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
+Values = Annotated[list[Any], Field(min_length=1, max_length=1000)]
+Condition = Annotated[dict[str, Any], Field(min_length=1)]
+BESIDE = ("name", "video", "episodes")
+"""Keys that do not decide how an episode goes."""
+
+
+def digest_of(value: Any) -> str:
+    """Twelve hexadecimal digits of anything that JSON can hold."""
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+class RunConfig(BaseModel):
+    """One method on one task at one level: a cell.
+
+    Attributes:
+        name: first part of the run folder's name.
+        task: what to do, like "stack".
+        method: the policy, like "screw".
+        demonstration: name of a shipped demonstration, or a file.
+        episodes: how many scenarios.
+        level: how far they differ from the demonstration.
+        robot: robosuite's name.
+        seed: scenario k has the seed `seed + k`.
+        obstacles: their kind; None: what the level says.
+        env: more arguments of the environment, like `n_blocks` of stacking.
+        max_seconds: simulated time limit of an episode; None: the task's own.
+        video: make a video of the first episode, where there is a single cell.
+        settings: of the method; see its own settings for the keys.
+    """
+
+    model_config = STRICT
+
+    name: Name
+    task: str
+    method: str = "screw"
+    demonstration: str
+    episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 10
+    level: str = "L1"
+    robot: str = "Panda"
+    seed: Annotated[int, Field(ge=0, le=2**31)] = 0
+    obstacles: str | None = None
+    env: dict[str, Any] = Field(default_factory=dict)
+    max_seconds: Annotated[float, Field(gt=0, le=3600)] | None = None
+    video: bool = True
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+    def digest(self) -> str:
+        """Twelve hexadecimal digits of all that decides how an episode goes: not of name, video and episodes."""
+        return digest_of(self.model_dump(mode="json", exclude=set(BESIDE)))
+
+
+class Default(BaseModel):
+    """What holds for some cells unless it is written elsewhere.
+
+    Attributes:
+        when: key: value, or list of values, that a cell has; keys with dots reach into mappings.
+        set: keys of a cell; mappings are merged.
+    """
+
+    model_config = STRICT
+
+    when: Condition
+    set: Annotated[dict[str, Any], Field(min_length=1)]
+
+
+class RunSettings(BaseModel):
+    """What a config may hold besides the keys of a cell.
+
+    Attributes:
+        sweep: key: list of values; there is a cell for each combination, the first key varying slowest.
+        defaults: for some of the cells; weaker than what is written outside of them, later ones stronger than earlier.
+        exclude: conditions of combinations that are left out.
+        executor: where episodes run: in this process, in worker processes, or in Ray's actors.
+        workers: how many; None: one for each processor core.
+        address: of a Ray cluster; None: a local one.
+        wall_seconds: real time after which an episode's worker counts as hung.
+    """
+
+    model_config = STRICT
+
+    sweep: dict[str, Values] = Field(default_factory=dict)
+    defaults: list[Default] = Field(default_factory=list)
+    exclude: list[Condition] = Field(default_factory=list)
+    executor: Literal["serial", "process", "ray"] = "process"
+    workers: Annotated[int, Field(ge=1, le=1024)] | None = None
+    address: str | None = None
+    wall_seconds: Annotated[float, Field(gt=0, le=86_400)] = 600.0
+
+
+CELL_KEYS = tuple(RunConfig.model_fields)
+RUN_KEYS = tuple(RunSettings.model_fields)
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON schema of a config file, for editors."""
+    cell, run = RunConfig.model_json_schema(), RunSettings.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "OneDemo benchmark config",
+        "description": "Keys of a cell, which hold for all cells, and how the cells are made and run.",
+        "type": "object",
+        "properties": {**cell["properties"], **run["properties"]},
+        "required": ["name"],
+        "additionalProperties": False,
+        "$defs": {**cell.get("$defs", {}), **run.get("$defs", {})},
+    }
+
+
+def unknown_key(key: str, allowed: tuple[str, ...]) -> str:
+    """Why a key is refused, and what may have been meant."""
+    close = get_close_matches(key, allowed, n=1)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"unknown key; {hint}allowed: {', '.join(allowed)}"
+
+
+def reason_of(error: Any, allowed: tuple[str, ...]) -> str:
+    """One of pydantic's errors in the project's words."""
+    if error["type"] == "extra_forbidden":
+        return unknown_key(str(error["loc"][-1]), allowed)
+    if error["type"] == "missing":
+        return "is missing"
+    return f"{error['msg'][0].lower()}{error['msg'][1:]}, got {error['input']!r}"

@@ -1,0 +1,215 @@
+"""Runs that are killed, cut, split or mixed up end with the same table, or are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from fake_runs import ONE_CELL, completed, dispatcher, grid_in
+
+from onedemo.bench.records import FILE, RecordWriter, read_records
+from onedemo.bench.run_folder import Shard, gather, parsed_shard, read_cells, recorded, table_hash
+from onedemo.bench.run_report import write_report
+from onedemo.bench.scenarios import check_mergeable, read_suite
+from onedemo.planner.errors import BadConfig
+
+SCRIPT = Path(__file__).parents[1] / "fake_runs.py"
+KILLS = 5 * int(os.environ.get("ONEDEMO_SOAK", "1"))
+SEED = int(os.environ.get("ONEDEMO_SEED", "0"))
+
+
+def fake_onedemo(folder, *arguments, **options):
+    run = [sys.executable, str(SCRIPT), "run", "grid.yaml", *arguments]
+    fake = {**os.environ, "FAKE": json.dumps({"pause": 0.02})}
+    return subprocess.Popen(run, cwd=folder, env=fake, text=True, stdout=-1, stderr=-1, **options)
+
+
+def table_of(folder):
+    """Hash of all results, and how many lines hold a record."""
+    _, labeled = read_cells(folder)
+    cells = [cell for _, cell in labeled]
+    records, _ = recorded(folder, cells, read_suite(folder))
+    return table_hash(records.values()), len(records)
+
+
+def test_a_run_that_is_killed_at_any_moment_loses_no_finished_episode(tmp_path):
+    grid_in(tmp_path)
+    begun = time.monotonic()
+    whole = fake_onedemo(tmp_path, "-q", "-o", "whole")
+    assert whole.communicate(timeout=120)[1] == ""
+    seconds = time.monotonic() - begun
+    (reference,) = (tmp_path / "whole").iterdir()
+    draw, finished = random.Random(SEED), 0
+    for attempt in range(KILLS):
+        run = fake_onedemo(tmp_path, "-q")
+        # startup takes most of the time, and nothing can be lost in it
+        time.sleep(draw.uniform(0.3, 1.05) * seconds)
+        run.send_signal(signal.SIGKILL)
+        run.communicate(timeout=60)
+        for file in tmp_path.glob(f"runs/*/{FILE}"):
+            records, foreign = read_records(file)
+            assert foreign == [], f"kill {attempt}"
+            assert len({record.key for record in records}) == len(records) >= finished
+            finished = len(records)
+        if finished == 48:
+            shutil.rmtree(tmp_path / "runs")
+            finished = 0
+    assert fake_onedemo(tmp_path, "-q").wait(timeout=120) == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert table_of(folder) == table_of(reference) == (table_of(reference)[0], 48)
+    assert summary_of(folder) == summary_of(reference)
+
+
+def summary_of(folder):
+    rows = json.loads((folder / "summary.json").read_text())["rows"]
+    return [{key: value for key, value in row.items() if not key.startswith("tick_us")} for row in rows]
+
+
+def test_a_file_cut_at_every_byte_of_its_last_three_lines_heals_to_the_same_table(tmp_path):
+    grid = grid_in(tmp_path, ONE_CELL)
+    folder = tmp_path / "run"
+    records = completed(grid, folder, dispatcher())
+    suite, reference = read_suite(folder), table_hash(records.values())
+    whole = (folder / FILE).read_bytes()
+    lines = whole.splitlines(keepends=True)
+    by_key = {record.key: record for record in records.values()}
+    for cut in range(len(b"".join(lines[:-3])), len(whole) + 1):
+        (folder / FILE).write_bytes(whole[:cut])
+        found, notes = recorded(folder, grid.cells, suite)
+        complete = whole[:cut].count(b"\n")
+        assert len(found) == complete
+        torn = cut > 0 and whole[cut - 1 : cut] != b"\n"
+        assert [f"line {complete + 1}: torn" in note for note in notes] == [True] * torn
+        writer = RecordWriter(folder / FILE)
+        for key in sorted(set(by_key) - set(found)):
+            writer.append(by_key[key])
+        writer.close()
+        healed, notes = recorded(folder, grid.cells, suite)
+        assert (table_hash(healed.values()), notes) == (reference, [])
+
+
+def test_a_run_goes_on_after_a_cut(tmp_path, capsys):
+    grid = grid_in(tmp_path)
+    folder = tmp_path / "run"
+    reference = table_hash(completed(grid, folder, dispatcher()).values())
+    whole = (folder / FILE).read_bytes()
+    (folder / FILE).write_bytes(whole[:-30])
+    capsys.readouterr()
+    assert table_hash(completed(grid, folder, dispatcher()).values()) == reference
+    err = capsys.readouterr().err
+    assert "line 48: torn, its episode is run again" in err
+    assert "47 of 48 episodes were done before" in err
+
+
+def test_lines_of_others_are_named_and_skipped(tmp_path, capsys):
+    grid = grid_in(tmp_path)
+    folder = tmp_path / "run"
+    records = list(completed(grid, folder, dispatcher()).values())
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join([*lines[:3], b"hello\n", *lines[4:]]))
+    writer = RecordWriter(folder / FILE)
+    writer.append(replace(records[0], cell="0" * 12, success=False))
+    writer.append(replace(records[0], scenario="0" * 12, success=False))
+    writer.close()
+    capsys.readouterr()
+    assert table_hash(completed(grid, folder, dispatcher()).values()) == table_hash(records)
+    err = capsys.readouterr().err
+    assert "line 4: not an episode record, skipped" in err
+    assert "line 49: an episode of another run, skipped" in err
+    assert "line 50: an episode of another run, skipped" in err
+
+
+def test_parts_make_the_whole(tmp_path):
+    grid = grid_in(tmp_path)
+    reference = completed(grid, tmp_path / "whole", dispatcher())
+    folder = tmp_path / "run"
+    for index in (3, 1, 2):
+        completed(grid, folder, dispatcher(), Shard(index, 3))
+    assert sorted(file.name for file in folder.glob("episodes*")) == [f"episodes.{k}-of-3.jsonl" for k in (1, 2, 3)]
+    parts = [read_records(folder / f"episodes.{k}-of-3.jsonl")[0] for k in (1, 2, 3)]
+    assert [len(part) for part in parts] == [16, 16, 16]
+    gather(folder)
+    merged, foreign = read_records(folder / FILE)
+    assert foreign == []
+    assert table_hash(merged) == table_hash(reference.values())
+    assert [record.key for record in merged] == [
+        (cell.digest(), index) for cell in grid.cells for index in range(12)
+    ], "in the order of the cells"
+    # what is there is not run again, however it is split
+    assert len(completed(grid, folder, dispatcher(), Shard(1, 2))) == 48
+    assert (folder / "episodes.1-of-2.jsonl").exists() is False
+
+
+@pytest.mark.parametrize("text", ["0/2", "3/2", "1", "a/b", "1/0", "-1/2", "1/2/3", "1.5/2", ""])
+def test_a_part_that_there_is_not_is_refused(text):
+    with pytest.raises(BadConfig, match=r"--shard: .* is not i/n with i from 1 to n, like 2/4"):
+        parsed_shard(text)
+
+
+def test_the_last_part_reports(tmp_path):
+    grid_in(tmp_path)
+    for k in (1, 2):
+        run = fake_onedemo(tmp_path, "--shard", f"{k}/2", "-o", "parts")
+        out, err = run.communicate(timeout=120)
+        assert run.returncode == 0, err
+        said = "part 1 of 2 is done; 24 episodes of other parts are missing" in out
+        assert said == (k == 1)
+    (folder,) = (tmp_path / "parts").iterdir()
+    assert (folder / "report.md").is_file()
+    assert len(read_records(folder / FILE)[0]) == 48
+
+
+def test_runs_on_different_scenarios_are_not_put_side_by_side(tmp_path):
+    texts = ["method: screw\n", "settings: {trim: 0.03}\n", "seed: 5\n"]
+    base = "name: one\ntask: stack\ndemonstration: stack\nepisodes: 3\nvideo: false\n"
+    suites = {}
+    for k, text in enumerate(texts):
+        folder = tmp_path / str(k)
+        completed(grid_in(tmp_path, base + text), folder, dispatcher(1))
+        suites[folder] = read_suite(folder)
+    same = {key: suites[key] for key in list(suites)[:2]}
+    check_mergeable(same)
+    with pytest.raises(BadConfig, match=r"2.scenarios\.json: suite: .* they cannot be compared"):
+        check_mergeable(suites)
+
+
+def test_a_folder_keeps_its_config_and_its_scenarios(tmp_path):
+    grid = grid_in(tmp_path)
+    folder = tmp_path / "run"
+    completed(grid, folder, dispatcher())
+    other = grid_in(tmp_path, "name: other\ntask: stack\ndemonstration: stack\nepisodes: 3\n")
+    with pytest.raises(BadConfig, match=r"cells\.json: run: the folder belongs to another config"):
+        completed(other, folder, dispatcher())
+    file = folder / "scenarios.json"
+    text = file.read_text()
+    for changed, message in [
+        (text.replace('"x":[0.1]', '"x":[0.2]', 1), "suite: is not the hash of the scenarios"),
+        (text.replace('"version": 1', '"version": 7'), "version: is 7; known: 1"),
+        (text[:-20], "is not a list of scenarios"),
+    ]:
+        assert changed != text
+        file.write_text(changed)
+        with pytest.raises(BadConfig, match=message):
+            completed(grid, folder, dispatcher())
+
+
+def test_a_report_is_made_of_the_folder_alone(tmp_path):
+    grid = grid_in(tmp_path)
+    records = completed(grid, tmp_path / "run", dispatcher())
+    lines = write_report(tmp_path / "run")
+    text = (tmp_path / "run" / "report.md").read_text()
+    assert table_hash(records.values()) in text
+    for cell in grid.cells:
+        assert f"| {grid.label(cell)} | 12 |" in text
+    assert len(lines) == 5
+    with pytest.raises(BadConfig, match="is this a run folder"):
+        write_report(tmp_path)
