@@ -15,6 +15,7 @@ import numpy as np
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
+from ..planner.foresight import nearest
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.tsia import imitated_path, screw_path
@@ -31,6 +32,8 @@ BETWEEN = 0.07
 """Way back [m] after which the fingers are no longer between books."""
 PACE = 0.6
 """Share of the joints' speed limits that is used with a book: one that is moved faster turns in the hand."""
+CHANCES = 3
+"""How often an insertion is begun, each time from another posture."""
 PATIENCE = 5.0
 """Seconds that a book is waited for."""
 
@@ -112,19 +115,33 @@ class ShelveProgram:
     def _shelve(self, k: int) -> Iterator[np.ndarray]:
         names = [each.name for each in self.task.objects]
         touching = (("held", CUPBOARD), *_around(names[:k] + names[k + 1 :]))
-        # the book slips a little while it is lifted: the goal is computed from how it is held now
-        held = self._held(k)
-        insertion = self._insertion(k, held)
-        into = self._leg("insert", k, insertion[-1], touching, held)._replace(strictly=True)
-        leg, choice = self._chosen_carry(k, insertion[0], held, into)
-        yield from self._done(choice, leg)
-        self.hand.surroundings.keep(OBJECT_MARGIN)
-        self.hand.allow(touching)
-        yield from self.hand.follow(self._insertion(k, self._held(k)), strictly=True)
+        for chance in range(CHANCES):
+            # the book slips a little while it is lifted: the goal is computed from how it is held now
+            held = self._held(k)
+            insertion = self._insertion(k, held)
+            into = self._leg("insert", k, insertion[-1], touching, held)._replace(strictly=True)
+            leg, choice = self._chosen_carry(k, insertion[0], held, into)
+            yield from self._done(choice, leg)
+            self.hand.surroundings.keep(OBJECT_MARGIN)
+            self.hand.allow(touching)
+            insertion = self._insertion(k, self._held(k))
+            try:
+                yield from self.hand.follow(insertion, strictly=True)
+                break
+            except PlanFailed as failed:
+                if chance + 1 == CHANCES or failed.reason == "dropped":
+                    raise
+            yield from self._backed_out(insertion)
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(self._release, self.settings.open)
         self.hand.release()
         self.hand.allow(_around(names))
+
+    def _backed_out(self, insertion: PosePath) -> Iterator[np.ndarray]:
+        """Out again, to where an insertion has begun."""
+        here = nearest(insertion, self.hand.arm.fk(self.hand.q))
+        if here:
+            yield from self.hand.follow(insertion[: here + 1].reversed(), loosely=True, strictly=True)
 
     def _chosen_carry(self, k: int, goal: Pose, held: Pose, into: Leg) -> tuple[Leg, Choice]:
         """To before the slot, well clear of everything; with little room where there is no other way."""

@@ -144,7 +144,7 @@ class ReactivePlanner:
         if status == ARRIVED:
             self.state = DONE
             return self._stand(joints, DONE)
-        if self._strictly and self._is_astray(joints, safety):
+        if self._strictly and self._goes_astray(joints, safety):
             return self._waited(joints, self._stand(joints, WAITING))
         if self._moving and self.settings.horizon > 0.0:
             self._decided -= dt
@@ -196,12 +196,15 @@ class ReactivePlanner:
         alone = SceneWork(self._layout, [place], settings.repet.distance, self._known_allowed([place]))
         return min(alone.room(q), alone.tool_room(goal)) > settings.repet.distance - settings.safety.distance
 
-    def _is_astray(self, q: np.ndarray, safety: int) -> bool:
-        """True if the safety layer has led the tool away from its path, or from the line to its beginning."""
+    def _goes_astray(self, q: np.ndarray, safety: int) -> bool:
+        """True if the safety layer leads the tool away from its path, or from the line to its beginning."""
         assert self._path is not None
         if self._line is None:
             self._line = np.vstack([self.arm.fk(q).dq, self._path.dqs])
-        return safety != FREE and strayed(self.arm, q[None], self._line) > STRAY
+        if safety == FREE:
+            return False
+        later = strayed(self.arm, (q + self.settings.plan.motion.dt * self._out)[None], self._line)
+        return later > STRAY and later > strayed(self.arm, q[None], self._line)
 
     def _following(self) -> str:
         return ESCAPING if self._detour else FOLLOWING
@@ -245,15 +248,15 @@ class ReactivePlanner:
         waited = self._memory[WAITED]
         if waited > self.settings.patience:
             self._lost += waited
-            # what stands still at the goal will not leave it
-            hopeless = not self._moving and (self._tries >= 3 or self._why_not[0] == "goal in collision")
+            # what stands still at the goal will not leave it; a strict leg is begun again from elsewhere
+            hopeless = (not self._moving or self._strictly) and self._tries >= 3
+            hopeless |= not self._moving and self._why_not[0] == "goal in collision"
             if hopeless or self._lost > self.settings.give_up:
                 self.state, (self.reason, self.detail) = FAILED, self._why()
                 return self._stand(q, FAILED)
-            self._tries += 1
+            self._tries, self._memory[WAITED] = self._tries + 1, 0.0
             if not self._strictly:
                 self._replan(q, self._obstacles)
-            self._memory[WAITED] = 0.0
         return command
 
     def _why(self) -> tuple[str, str]:
@@ -311,8 +314,7 @@ class ReactivePlanner:
 
 def warm_up(arm: Arm, body: Body) -> None:
     """Compile, or load from the cache, what following among obstacles may need, so that no tick has to wait for it."""
-    low, high = np.maximum(arm.lower, -1.0), np.minimum(arm.upper, 1.0)
-    q = 0.5 * (low + high)
+    q = 0.5 * (np.maximum(arm.lower, -1.0) + np.minimum(arm.upper, 1.0))
     path = PosePath(arm.fk(q).dq[None])
     things = (Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.0, 0.0, 50.0]), np.array([0.0, 0.0, 1e-3])),)
     planner = ReactivePlanner(arm, body)
