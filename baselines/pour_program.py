@@ -184,7 +184,8 @@ class PourProgram:
 
     def _planned(self, planner: Planner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
         """A motion to the end of a path, round what is around."""
-        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=allowed)
+        contacts = (*self.task.touching, *allowed)
+        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=contacts)
         followed = path if plan.how == "joint search" or not plan.success else plan.path
         rank = 0 if not plan.success else 2 if plan.how == "direct" else 1
         reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..envs.robots import robot_named
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
@@ -43,7 +44,7 @@ class ShelveProgram:
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ScrewSettings, hand: Hand):
         self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
         self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
-        self._release = _gripper_after(shown, "insert")
+        self._release = _gripper_after(shown, "insert", task)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 
     def actions(self) -> Iterator[np.ndarray]:
@@ -148,7 +149,8 @@ class ShelveProgram:
         hand, target = self.hand, self.task.objects[k]
         body = hand.empty if held is None else hand.body_with(target.shape, held)
         around = hand.surroundings.around(hand.observation, None if held is None else k)
-        return Leg(f"{name} {target.name}", self._parts[name], (goal,), body, around, allowed)
+        contacts = (*self.task.touching, *allowed)
+        return Leg(f"{name} {target.name}", self._parts[name], (goal,), body, around, contacts)
 
     def _held(self, k: int) -> Pose:
         """`tcp_from_object` as observed."""
@@ -160,7 +162,10 @@ def _around(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     return tuple((part, name) for part in ("fingers", "hand") for name in names)
 
 
-def _gripper_after(shown: Demonstration, name: str) -> float:
-    """What the demonstrated gripper did at the end of a motion."""
+def _gripper_after(shown: Demonstration, name: str, task: TaskDescription) -> float:
+    """What opens this gripper as far as the demonstrated one was opened at the end of a motion."""
     assert shown.gripper is not None
-    return float(shown.gripper[shown.segment(name).stop + 1])
+    action = float(shown.gripper[shown.segment(name).stop + 1])
+    if shown.robot == task.robot or action >= 0.0:
+        return action
+    return max(action * robot_named(shown.robot).opening / task.gripper_width[0], OPEN)

@@ -20,7 +20,7 @@ from onedemo.planner.errors import BadAction, OneDemoError, RenderingUnavailable
 
 ALL = sorted(onedemo.envs.IDS)
 CASES = [(name, {}) for name in ALL] + [
-    ("onedemo/Stack-v0", {"robot": "Baxter"}),
+    *[(f"onedemo/{task}-v0", {"robot": "Baxter"}) for task in ("Stack", "Pour", "Shelve")],
     ("onedemo/Stack-v0", {"level": "L4"}),
 ]
 LABELS = [" ".join([name.split("/")[1], *options.values()]) for name, options in CASES]
