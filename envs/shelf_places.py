@@ -56,5 +56,26 @@ SHELF_PLACES: dict[str, ShelfPlaces | str] = {
         np.deg2rad(49.5),
         (2.094, -2.612, -2.221, 0.946, -2.239, -0.920, 1.584),
     ),
+    "UR5e": ShelfPlaces(
+        (0.25, -0.302, 1.145),
+        np.deg2rad(5.5),
+        (-0.005, 0.031),
+        np.deg2rad(45.0),
+        (-1.080, -0.881, 1.932, 2.093, -0.394, -0.002),
+    ),
+    "IIWA": ShelfPlaces(
+        (0.238, -0.157, 1.108),
+        np.deg2rad(37.2),
+        (0.023, 0.055),
+        np.deg2rad(65.3),
+        (-1.259, 1.221, 0.655, -1.361, 1.109, 1.149, -0.803),
+    ),
+    "Kinova3": ShelfPlaces(
+        (0.249, -0.187, 1.15),
+        np.deg2rad(19.2),
+        (-0.078, 0.018),
+        np.deg2rad(55.1),
+        (1.570, 1.531, -1.473, 1.749, -0.593, 0.188, -0.992),
+    ),
 }
 """By robot; in place of what is missing the reason. Straight ahead, a Panda cannot insert anything by 20 cm."""

@@ -1,6 +1,6 @@
 """How much of a task a robot can reach from given places: inverse kinematics along the whole way, nothing touching.
 
-Knows the demonstration, but neither the planner nor the physics: a lower bound on the first and none on the second.
+Knows the demonstration, but neither the planner, which finds other ways too, nor the physics.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from onedemo.envs.shelf_parts import BOOK_SIZE, cupboard, stand, waiting
 from onedemo.envs.shelf_places import ShelfPlaces
 from onedemo.envs.task import TaskFurniture
 from onedemo.planner import dualquat as dq
+from onedemo.planner.body import Body
 from onedemo.planner.clearance import room_at
 from onedemo.planner.demo_io import load_demonstration
 from onedemo.planner.ik import inverse_kinematics
@@ -61,11 +62,17 @@ class Reach:
         scene = compiled_scene(robot)
         self.arm, self.home = scene.arms[0].arm, scene.home[0]
         self._parts = robot_parts(robot, scene)
+        self.body = self._parts.bodies[0]
         self._pairs = pairs_of((self.arm,), self._parts.bodies, apart=WRIST)
 
-    def among(self, obstacles: Iterable[Obstacle], allowed: Sequence[tuple[str, str]] = ()) -> np.ndarray:
-        """The robot among these and its fixtures, for `room`; the contacts of `allowed` do not count."""
-        solids, body = (*self._parts.fixtures, *obstacles), self._parts.bodies[0]
+    def among(
+        self, obstacles: Iterable[Obstacle], allowed: Sequence[tuple[str, str]] = (), body: Body | None = None
+    ) -> np.ndarray:
+        """The robot, or a body of it that holds something, among these and its fixtures, for `room`.
+
+        The contacts of `allowed` do not count.
+        """
+        solids, body = (*self._parts.fixtures, *obstacles), body or self.body
         masks = contact_masks(body.names, solids, (*self._parts.touching, *allowed))
         settings = SafetySettings().packed(0.02)
         return robot_work((self.arm,), (body,), pack(solids), masks=masks, pairs=self._pairs, settings=settings)
@@ -174,10 +181,17 @@ class ShelfReach(Reach):
 
     def shelved(self, drawn: ShelfLayout, q: np.ndarray | None, shelf: str) -> bool:
         """Whether all books can be shelved from joints q."""
-        work = self.among(self.furniture(drawn), (("fingers", "stand"),))
+        work, loaded = self.works(drawn)
         for k, goal in enumerate(drawn.goals(shelf)):
-            q = self._book(drawn.handed(k), Pose.from_vector(goal), q, work)
+            q = self._book(drawn.handed(k), Pose.from_vector(goal), q, work, loaded)
         return q is not None
+
+    def works(self, drawn: ShelfLayout) -> tuple[np.ndarray, np.ndarray]:
+        """The arm among the furniture with an empty hand, and with a book in it."""
+        around = self.furniture(drawn)
+        full = self.body.holding("held", Box(BOOK_SIZE), self.grasp.inverse(), self.arm)
+        wanted = ("fingers", "stand")
+        return self.among(around, (wanted,)), self.among(around, (wanted, ("held", "stand")), full)
 
     def furniture(self, drawn: ShelfLayout) -> list[Obstacle]:
         """What stands there: the pile of books that wait, too."""
@@ -198,7 +212,9 @@ class ShelfReach(Reach):
         carry = imitated_path(self.parts["carry"], before)
         return final_path(lifted, carry, guide_index(carry))
 
-    def _book(self, book: Pose, goal: Pose, q: np.ndarray | None, work: np.ndarray) -> np.ndarray | None:
+    def _book(
+        self, book: Pose, goal: Pose, q: np.ndarray | None, work: np.ndarray, loaded: np.ndarray
+    ) -> np.ndarray | None:
         """Joints after a book was fetched and shelved."""
         reach, insert = imitated_path(self.parts["reach"], book @ self.grasp), self.insertion(goal)
         lift, retreat = (
@@ -206,6 +222,7 @@ class ShelfReach(Reach):
             for name, start in (("lift", reach[-1]), ("retreat", insert[-1]))
         )
         q = self.to([reach[0]], q, work)
-        for path in (reach, lift, self.carried(lift[-1], insert[0]), insert, retreat):
-            q = self.along(path, q, work)
+        carry = self.carried(lift[-1], insert[0])
+        for path, around in ((reach, work), (lift, work), (carry, loaded), (insert, work), (retreat, work)):
+            q = self.along(path, q, around)
         return q
