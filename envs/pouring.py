@@ -6,28 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 from ..planner.ik import inverse_kinematics
 from ..planner.pose import Pose
 from ..planner.shapes import Obstacle, pack
 from . import spaces as space
-from .base import SLOTS, OneDemoEnv
+from .base import OneDemoEnv
 from .beads import poured_into
-from .options import checked_joints
+from .options import check_known, checked_joints
 from .placement import Leg
 from .pour_geometry import BACK, BEADS, GLASSES, SOURCE, STANDS, TARGET, TILTED, UP, grasp, pouring, tcp_from_glass
 from .pour_layouts import GAP, LONG_GAP, RANGES, checked_stands, pour_layout
 from .pour_places import POUR_PLACES
 from .pour_rules import PourProgress
 from .render import View
-from .robot_parts import robot_parts
 from .robots import places_of, robot_named
 from .rooms import arm_room
 from .sim import Start
-from .spaces import observation_space
 from .state import State
-from .task import TaskDescription, TaskFurniture, TaskObject
-from .things import TABLE_HEIGHT, Things
+from .things import Things
 
 OPTIONS = ("level", "obstacles", "stands", "joint_positions")
 RAISED, ABOVE = 0.12, (0.0, 0.04, 0.08)
@@ -42,7 +39,7 @@ MAX_STARTS = 200
 VIEW = View((-0.14, -0.02, 1.06), 1.42, 150.0, -17.0)
 
 
-class PourEnv(OneDemoEnv):
+class PourEnv(OneDemoEnv[PourProgress]):
     """Pour the beads of one glass into another with one arm.
 
     ## Description
@@ -141,8 +138,11 @@ class PourEnv(OneDemoEnv):
         robot_named(robot).check_grip(2.0 * places.source.radius, robot, "the source")
         self._glasses = (places.source, GLASSES[TARGET])
         super().__init__(
+            name="pour",
             robot=robot,
             things=Things(self._glasses, STANDS, BEADS),
+            goals=1,
+            motions=2,
             level=level,
             obstacles=obstacles,
             control_mode=control_mode,
@@ -150,34 +150,12 @@ class PourEnv(OneDemoEnv):
             render_mode=render_mode,
             control_frequency=control_frequency,
             view=VIEW,
+            more={"furniture_pose": space.pose_box(2), "bead_fraction": space.box(0.0, 1.0, (3,))},
         )
         self.pregrasped = pregrasped
-        parts = robot_parts(robot, self.sim.scene)
-        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
         self._nominal = checked_stands(places.stands if stands is None else stands, self._axis)
         self._ready = checked_joints(places.ready if ready is None else ready, self.arms)
-        more = {"furniture_pose": space.pose_box(2), "bead_fraction": space.box(0.0, 1.0, (3,))}
-        self.observation_space = observation_space(self.arms, widths, 2, 1, 2, SLOTS, **more)
-        self._task = TaskDescription(
-            name="pour",
-            robot=robot,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(glass) for glass in self._glasses),
-            bodies=parts.bodies,
-            table_height=TABLE_HEIGHT,
-            fixtures=parts.fixtures,
-            gripper_width=widths,
-            furniture=tuple(TaskFurniture.of(each) for each in STANDS),
-            obstacles=SLOTS,
-            touching=parts.touching,
-        )
         self._place(self._nominal)
-
-    @property
-    def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
-        return self._task
 
     @property
     def _axis(self) -> np.ndarray:
@@ -195,9 +173,7 @@ class PourEnv(OneDemoEnv):
         return glasses
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        for key in options:
-            if key not in OPTIONS:
-                raise UnknownName("reset option", key, OPTIONS)
+        check_known(options, OPTIONS)
         given = checked_stands(options["stands"], self._axis) if "stands" in options else None
         wanted = checked_joints(options["joint_positions"], self.arms) if "joint_positions" in options else None
         ranges = RANGES[layout]
@@ -255,17 +231,6 @@ class PourEnv(OneDemoEnv):
         was, now = self._nominal[glass, :2] - self._axis, place[:2] - self._axis
         turned = np.arctan2(now[1], now[0]) - np.arctan2(was[1], was[0])
         return float(np.arctan2(approach[1], approach[0]) + turned)
-
-    def _goals(self) -> tuple[np.ndarray, float]:
-        return self._goal_pose.copy(), self._progress.motion_index
-
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress = self._progress
-        verdict = progress.update(state)
-        if verdict.unwanted:
-            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or progress.failed, progress.info()
 
     def _more_observed(self, state: State) -> dict[str, np.ndarray]:
         return {"furniture_pose": self._furniture.copy(), "bead_fraction": self._progress.fractions}

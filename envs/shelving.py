@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 from ..planner.pose import Pose
 from ..planner.shapes import Box, Obstacle, pack
-from .base import MAX_LAYOUTS, SLOTS, Observation, OneDemoEnv, checked_choice
-from .options import checked_joints
+from .base import MAX_LAYOUTS, Observation, OneDemoEnv, checked_choice
+from .options import check_known, checked_joints
 from .placement import Leg, Order
 from .render import Ghost, View
-from .robot_parts import robot_parts
 from .robots import places_of, robot_named
 from .rooms import arm_room
 from .shelf_layouts import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
@@ -22,10 +21,9 @@ from .shelf_parts import BOOK_SIZE, SHELVES, books, cupboard, stand
 from .shelf_places import SHELF_PLACES
 from .shelve_rules import ShelveProgress
 from .sim import Start
-from .spaces import observation_space, pose_box
+from .spaces import pose_box
 from .state import State
-from .task import TaskDescription, TaskFurniture, TaskObject
-from .things import TABLE_HEIGHT, Things
+from .things import Things
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
 LIFT, WAY_IN = 0.15, 0.22
@@ -43,7 +41,7 @@ PAPER_SIZES = (0.06, 0.09)
 """Of the obstacles that appear while the second and the third book are placed [m]."""
 
 
-class ShelveEnv(OneDemoEnv):
+class ShelveEnv(OneDemoEnv[ShelveProgress]):
     """Shelve three books in the upper shelf of a cluttered cupboard, with one arm.
 
     ## Description
@@ -149,8 +147,11 @@ class ShelveEnv(OneDemoEnv):
         self._places = places_of(SHELF_PLACES, robot, "shelve")
         robot_named(robot).check_grip(BOOK_SIZE[1], robot, "a book")
         super().__init__(
+            name="shelve",
             robot=robot,
             things=Things(objects, furniture),
+            goals=n_books,
+            motions=2 * n_books,
             level=level,
             obstacles=obstacles,
             control_mode=control_mode,
@@ -158,33 +159,11 @@ class ShelveEnv(OneDemoEnv):
             render_mode=render_mode,
             control_frequency=control_frequency,
             view=VIEW,
-        )
-        parts = robot_parts(robot, self.sim.scene)
-        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        counts = (len(objects), n_books, 2 * n_books, SLOTS)
-        self.observation_space = observation_space(self.arms, widths, *counts, furniture_pose=pose_box(len(furniture)))
-        self._task = TaskDescription(
-            name="shelve",
-            robot=robot,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(book) for book in objects),
-            bodies=parts.bodies,
-            table_height=TABLE_HEIGHT,
-            fixtures=parts.fixtures,
-            gripper_width=widths,
-            furniture=tuple(TaskFurniture.of(each) for each in furniture),
-            obstacles=SLOTS,
-            touching=parts.touching,
+            more={"furniture_pose": pose_box(len(furniture))},
         )
         self._ready = np.array([self._places.ready])
         self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], self._places, n_books, self._ready.shape)
         self._take_layout(self._drawn)
-
-    @property
-    def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
-        return self._task
 
     def _take_layout(self, drawn: ShelfLayout) -> None:
         self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
@@ -192,9 +171,7 @@ class ShelveEnv(OneDemoEnv):
         self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        for key in options:
-            if key not in OPTIONS:
-                raise UnknownName("reset option", key, OPTIONS)
+        check_known(options, OPTIONS)
         drawn, joints = self._drawn_clear(options, layout)
         self._take_layout(drawn)
         return Start(joints, drawn.objects(), self._furniture)
@@ -254,16 +231,5 @@ class ShelveEnv(OneDemoEnv):
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose[self._progress.placed :]]
 
-    def _goals(self) -> tuple[np.ndarray, float]:
-        return self._goal_pose.copy(), self._progress.motion_index
-
     def _more_observed(self, state: State) -> Observation:
         return {"furniture_pose": self._furniture.copy()}
-
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress = self._progress
-        verdict = progress.update(state)
-        if verdict.unwanted:
-            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or verdict.fallen == 1, progress.info()

@@ -88,6 +88,7 @@ ENVS_ORDER = [
     "options",
     "spaces",
     "state",
+    "progress",
     "servos",
     "trunk",
     "model_parts",
