@@ -129,9 +129,15 @@ class ShelveProgram:
         yield from self.hand.follow(path[free:], loosely=True)
 
     def _insertion(self, k: int, held: Pose) -> PosePath:
-        """The demonstrated insertion, to where the hand lets go so that the book is in its slot."""
-        above = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height])
-        return imitated_path(self._parts["insert"], above @ self.hand.goal_pose(k) @ held.inverse())
+        """The demonstrated insertion, to where the hand lets go so that the book is in its slot.
+
+        It stays as level as it was shown: a book that hangs a little in the hand turns the hand, not the way.
+        """
+        above, shown = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height]), self._parts["insert"]
+        end = above @ self.hand.goal_pose(k) @ held.inverse()
+        turn = Pose.from_yaw([0.0, 0.0, 0.0], (end @ shown[-1].inverse()).yaw)
+        level = Pose.from_position_quaternion(end.position - (turn @ shown[-1]).position) @ turn
+        return shown.moved(level).with_tool((level @ shown[-1]).inverse() @ end)
 
     def _from_here(self, name: str) -> PosePath:
         path = self._parts[name]

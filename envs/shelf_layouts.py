@@ -64,6 +64,7 @@ class ShelfLayout:
     Attributes:
         stand: the stand; x along the way in which a book is taken.
         cupboard: the cupboard.
+        pile: x, y of the books that wait [m].
         slots: shift of the middle of the slots along the shelf [m].
         books: (n, 3) x, y [m] and yaw [rad] of each book on the stand, from its nominal place there.
         clutter: (n, 2) gaps of the clutter, see `clutter_poses`.
@@ -72,6 +73,7 @@ class ShelfLayout:
 
     stand: Pose
     cupboard: Pose
+    pile: tuple[float, float]
     slots: float
     books: np.ndarray
     clutter: np.ndarray
@@ -84,7 +86,7 @@ class ShelfLayout:
     def objects(self) -> np.ndarray:
         """(n, 7) all books at the start: the first on the stand, the others in the pile, the last at its bottom."""
         count = len(self.books)
-        poses = [self.handed(0), *(waiting(count - 1 - k) for k in range(1, count))]
+        poses = [self.handed(0), *(waiting(self.pile, count - 1 - k) for k in range(1, count))]
         poses += [self.cupboard @ pose for pose in clutter_poses(self.clutter)]
         return np.array([pose.vector for pose in poses])
 
@@ -114,6 +116,7 @@ def shelf_layout(
     return ShelfLayout(
         stand=Pose.from_yaw([x, y, z], yaw),
         cupboard=Pose.from_yaw([*front, TABLE_HEIGHT], turned),
+        pile=places.pile,
         slots=rng.uniform(-ranges.slots, ranges.slots),
         books=rng.uniform(-limits, limits, (count, 3)),
         clutter=np.array([WALL_GAP, FRONT_GAP]) + rng.uniform(0.0, ranges.clutter, (len(CLUTTER), 2)),

@@ -25,6 +25,7 @@ class ShelfPlaces:
         cupboard: nominal middle of the cupboard's front [m].
         cupboard_yaw: nominal way in which a book is inserted [rad].
         ready: joints at the start [rad]: the hand level before the stand, fingers above each other.
+        pile: x, y of the books that wait on the table [m]: out of the arm's way.
     """
 
     stand: tuple[float, float, float]
@@ -32,6 +33,7 @@ class ShelfPlaces:
     cupboard: tuple[float, float]
     cupboard_yaw: float
     ready: Joints
+    pile: tuple[float, float] = (-0.21, -0.27)
 
 
 SHELF_PLACES: dict[str, ShelfPlaces | str] = {
@@ -57,25 +59,20 @@ SHELF_PLACES: dict[str, ShelfPlaces | str] = {
         (2.094, -2.612, -2.221, 0.946, -2.239, -0.920, 1.584),
     ),
     "UR5e": ShelfPlaces(
-        (0.25, -0.302, 1.145),
-        np.deg2rad(5.5),
-        (-0.005, 0.031),
-        np.deg2rad(45.0),
-        (-1.080, -0.881, 1.932, 2.093, -0.394, -0.002),
+        (-0.092, -0.208, 1.1),
+        np.deg2rad(49.66),
+        (-0.061, 0.050),
+        np.deg2rad(57.61),
+        (-1.525, -0.644, 1.565, -4.064, 0.820, 0.001),
+        pile=(0.24, -0.28),
     ),
     "IIWA": ShelfPlaces(
-        (0.238, -0.157, 1.108),
-        np.deg2rad(37.2),
-        (0.023, 0.055),
-        np.deg2rad(65.3),
-        (-1.259, 1.221, 0.655, -1.361, 1.109, 1.149, -0.803),
+        (0.098, -0.191, 1.168),
+        np.deg2rad(43.43),
+        (0.066, 0.036),
+        np.deg2rad(57.18),
+        (-1.403, 1.062, 0.533, -1.389, 1.029, 1.472, -0.714),
     ),
-    "Kinova3": ShelfPlaces(
-        (0.249, -0.187, 1.15),
-        np.deg2rad(19.2),
-        (-0.078, 0.018),
-        np.deg2rad(55.1),
-        (1.570, 1.531, -1.473, 1.749, -0.593, 0.188, -0.992),
-    ),
+    "Kinova3": "its wrist, of 13 Nm, follows too softly to keep a book clear of its neighbors",
 }
 """By robot; in place of what is missing the reason. Straight ahead, a Panda cannot insert anything by 20 cm."""

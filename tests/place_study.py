@@ -20,7 +20,7 @@ from onedemo.envs.pour_places import SLIM, WIDE, PourPlaces
 from onedemo.envs.robots import ROBOTS
 from onedemo.envs.shelf_layouts import RANGES as SHELF_RANGES
 from onedemo.envs.shelf_layouts import ShelfLayout, shelf_layout
-from onedemo.envs.shelf_parts import DEPTH, PILE, SIDE, WIDTH
+from onedemo.envs.shelf_parts import DEPTH, SIDE, WIDTH
 from onedemo.envs.shelf_places import ShelfPlaces
 from onedemo.planner.pose import Pose, PosePath
 from onedemo.planner.shapes import Obstacle
@@ -29,6 +29,8 @@ ROOM = 0.03
 """Least room [m] of the arm at the start."""
 LIFT, SHORT = 0.15, 0.20
 """Ways [m] of the hand up from the stand, and from the start to it."""
+PILE, BESIDE = ShelfPlaces.pile, 0.28
+"""Where books wait, and how far from there the stand is [m]."""
 IN_FRONT = 0.15
 """Least way [m] of the stand before the cupboard: a book in the hand has room."""
 HEIGHTS = (0.95, 1.0, 1.05)
@@ -90,7 +92,7 @@ def shelving(robot: str, tries: int, rng: np.random.Generator) -> Iterator[Found
             for _ in range(TRIES):
                 spot = rng.uniform([-0.3, -0.33, 1.10], [0.3, 0.33, 1.18])
                 before = (Pose.from_yaw([*front, 0.0], yaw).inverse() @ Pose.from_position_quaternion(spot)).position[0]
-                if before > -IN_FRONT:
+                if before > -IN_FRONT or np.hypot(*(spot[:2] - PILE)) < BESIDE:
                     continue
                 places = ShelfPlaces(
                     tuple(spot.round(3).tolist()), yaw + np.deg2rad(rng.uniform(-110.0, 60.0)), tuple(front), yaw, ()

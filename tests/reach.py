@@ -197,7 +197,7 @@ class ShelfReach(Reach):
         """What stands there: the pile of books that wait, too."""
         poses = [Pose.from_vector(row) for row in drawn.furniture()]
         solids = [part for each, pose in zip(FURNITURE, poses, strict=True) for part in each.at(pose)]
-        return [*solids, *(Obstacle(Box(BOOK_SIZE), waiting(k), name="pile") for k in range(2))]
+        return [*solids, *(Obstacle(Box(BOOK_SIZE), waiting(drawn.pile, k), name="pile") for k in range(2))]
 
     def before(self, goal: Pose) -> Pose:
         """The hand before a slot."""
