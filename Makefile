@@ -65,7 +65,7 @@ bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new rob
 	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"
 
 beads: $(VENV)/.developed ## let the beads settle in their glasses anew (for a new glass)
-	@$(BIN)/python -c "from onedemo.envs import beads, pour_geometry as g; beads.TABLE.write_text(beads.table_text(((g.GLASSES[0], g.BEADS),)))"
+	@$(BIN)/python -c "from onedemo.envs import beads, pour_geometry as g, pour_places as p; beads.TABLE.write_text(beads.table_text(((p.WIDE, g.BEADS), (p.SLIM, g.BEADS))))"
 
 clean: ## remove the environment, the caches and the builds; runs/ stays
 	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -187,7 +187,8 @@ class PourProgram:
 
     def _planned(self, planner: LegPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
         """A motion to the end of a path, round what is around."""
-        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=allowed)
+        contacts = (*self.task.touching, *allowed)
+        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=contacts)
         followed = path if plan.how == "joint search" or not plan.success else plan.path
         as_shown = plan.how == DIRECT or (plan.how in MADE and plan.kept == 1.0)
         rank = 0 if not plan.success else 2 if as_shown else 1

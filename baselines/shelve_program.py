@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..envs.robots import robot_named
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import PlanFailed
@@ -47,7 +48,7 @@ class ShelveProgram:
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
         self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
         self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
-        self._release = _gripper_after(shown, "insert")
+        self._release = _gripper_after(shown, "insert", task)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 
     def actions(self) -> Iterator[np.ndarray]:
@@ -168,9 +169,15 @@ class ShelveProgram:
         yield from self.hand.follow(path[free:], loosely=True)
 
     def _insertion(self, k: int, held: Pose) -> PosePath:
-        """The demonstrated insertion, to where the hand lets go so that the book is in its slot."""
-        above = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height])
-        return imitated_path(self._parts["insert"], above @ self.hand.goal_pose(k) @ held.inverse())
+        """The demonstrated insertion, to where the hand lets go so that the book is in its slot.
+
+        It stays as level as it was shown: a book that hangs a little in the hand turns the hand, not the way.
+        """
+        above, shown = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height]), self._parts["insert"]
+        end = above @ self.hand.goal_pose(k) @ held.inverse()
+        turn = Pose.from_yaw([0.0, 0.0, 0.0], (end @ shown[-1].inverse()).yaw)
+        level = Pose.from_position_quaternion(end.position - (turn @ shown[-1]).position) @ turn
+        return shown.moved(level).with_tool((level @ shown[-1]).inverse() @ end)
 
     def _from_here(self, name: str) -> PosePath:
         path = self._parts[name]
@@ -188,7 +195,8 @@ class ShelveProgram:
         hand, target = self.hand, self.task.objects[k]
         body = hand.empty if held is None else hand.body_with(target.shape, held)
         around = hand.surroundings.around(hand.observation, None if held is None else k)
-        return Leg(f"{name} {target.name}", self._parts[name], (goal,), body, around, allowed)
+        contacts = (*self.task.touching, *allowed)
+        return Leg(f"{name} {target.name}", self._parts[name], (goal,), body, around, contacts)
 
     def _held(self, k: int) -> Pose:
         """`tcp_from_object` as observed."""
@@ -200,7 +208,10 @@ def _around(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     return tuple((part, name) for part in ("fingers", "hand") for name in names)
 
 
-def _gripper_after(shown: Demonstration, name: str) -> float:
-    """What the demonstrated gripper did at the end of a motion."""
+def _gripper_after(shown: Demonstration, name: str, task: TaskDescription) -> float:
+    """What opens this gripper as far as the demonstrated one was opened at the end of a motion."""
     assert shown.gripper is not None
-    return float(shown.gripper[shown.segment(name).stop + 1])
+    action = float(shown.gripper[shown.segment(name).stop + 1])
+    if shown.robot == task.robot or action >= 0.0:
+        return action
+    return max(action * robot_named(shown.robot).opening / task.gripper_width[0], OPEN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -17,12 +17,14 @@ from . import spaces as space
 from .levels import checked_obstacles, level_named
 from .obstacles import Intruder
 from .placement import Leg, Order, Stage, placed
+from .progress import Progress
 from .render import TABLE_VIEW, Ghost, Renderer, View
+from .robot_parts import robot_parts
 from .scene import OBSTACLE
 from .sim import PHYSICS_DT, Simulation, Start
 from .state import State
-from .task import TaskDescription
-from .things import Things
+from .task import TaskDescription, TaskFurniture, TaskObject
+from .things import TABLE_HEIGHT, Things
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
@@ -35,6 +37,8 @@ SLOTS = 3
 MAX_LAYOUTS = 40
 """Starts that are drawn before a place for the obstacles must have been found."""
 Observation = dict[str, np.ndarray]
+Judged = TypeVar("Judged", bound=Progress)
+"""What keeps the progress of a task."""
 
 
 def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
@@ -48,16 +52,33 @@ def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
     return value
 
 
-class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
-    """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator."""
+class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
+    """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator.
+
+    Args:
+        name: of the task.
+        goals: how many goal poses there are.
+        motions: largest motion index.
+        more: entries of the observation that only this task has.
+        things: what there is besides the robot.
+        view: where the camera is.
+
+    The others are those of every environment, see their docstrings.
+    """
+
+    _goal_pose: np.ndarray
+    _progress: Judged
 
     metadata = METADATA
 
     def __init__(
         self,
         *,
+        name: str,
         robot: str,
         things: Things,
+        goals: int,
+        motions: int,
         level: str,
         obstacles: str | None,
         control_mode: str,
@@ -66,6 +87,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         control_frequency: int,
         arms: tuple[str, ...] | None = None,
         view: View = TABLE_VIEW,
+        more: dict[str, gym.spaces.Box] | None = None,
     ):
         level_named(level)
         self.level, self.obstacles = level, None if obstacles is None else checked_obstacles(obstacles, SLOTS)
@@ -84,11 +106,33 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         self._action = np.zeros(self.action_space.shape or ())
         self._renderer: Renderer | None = None
         self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
+        self._task = self._described(name, robot, things)
+        widths, objects = self._task.gripper_width, len(things.objects)
+        self.observation_space = space.observation_space(
+            self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
+        )
+
+    def _described(self, name: str, robot: str, things: Things) -> TaskDescription:
+        parts = robot_parts(robot, self.sim.scene)
+        return TaskDescription(
+            name=name,
+            robot=robot,
+            arms=self.arms,
+            control_dt=self.control_dt,
+            objects=tuple(TaskObject.of(each) for each in things.objects),
+            bodies=parts.bodies,
+            table_height=TABLE_HEIGHT,
+            fixtures=parts.fixtures,
+            gripper_width=tuple(self.sim.widest_opening(k) for k in range(len(self.arms))),
+            furniture=tuple(TaskFurniture.of(each) for each in things.furniture),
+            touching=parts.touching,
+            obstacles=SLOTS,
+        )
 
     @property
-    @abstractmethod
     def task(self) -> TaskDescription:
         """What every policy may know beforehand."""
+        return self._task
 
     @property
     def control_dt(self) -> float:
@@ -97,21 +141,13 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
 
     @abstractmethod
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        """Where things are in a new episode, obstacles aside; sets the task's own state.
+        """Where things are in a new episode, obstacles aside; sets `_goal_pose`, `_progress` and the task's own state.
 
         Args:
             options: those of `reset`, but for "level" and "obstacles"; unknown keys are refused.
             layout: name of the ranges to draw from.
             spacious: there will be obstacles, which need room.
         """
-
-    @abstractmethod
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        """Reward, terminated and info of the state just reached."""
-
-    @abstractmethod
-    def _goals(self) -> tuple[np.ndarray, float]:
-        """Goal poses (n, 7) and the index of the current motion."""
 
     @abstractmethod
     def _legs(self, start: Start) -> list[Leg]:
@@ -174,6 +210,15 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
             self._show()
         return self._observation(state), reward, terminated, False, info
 
+    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
+        """Reward, terminated and info of the state just reached."""
+        progress = self._progress
+        verdict = progress.update(state)
+        if verdict.unwanted:
+            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
+        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
+        return reward, progress.success or progress.failed, progress.info()
+
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step.
 
@@ -182,7 +227,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         """
         self._take(action)
         if self.sim.obstacles.intruders:
-            self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self._goals()[1])
+            self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self._progress.motion_index)
         if self.control_mode == "joint_velocity":
             bad = self.sim.step(self._action, self._speed_limits, 1.0, self.substeps)
         else:
@@ -247,15 +292,14 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC):
         return np.array(speeds)
 
     def _observation(self, state: State) -> Observation:
-        goals, motion = self._goals()
         return {
             "joint_positions": state.joint_positions,
             "joint_velocities": state.joint_velocities,
             "tcp_pose": state.tcp_pose,
             "gripper_opening": state.gripper_opening,
             "object_pose": state.object_pose,
-            "goal_pose": goals,
-            "motion_index": np.array([motion]),
+            "goal_pose": self._goal_pose.copy(),
+            "motion_index": np.array([self._progress.motion_index]),
             **self.sim.obstacles.observed(self._steps * self.control_dt),
             **self._more_observed(state),
         }

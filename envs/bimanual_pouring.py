@@ -7,26 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 from ..planner.ik import inverse_kinematics
 from ..planner.pose import Pose
 from ..planner.shapes import pack
 from . import spaces as space
-from .base import SLOTS, OneDemoEnv
+from .base import OneDemoEnv
 from .beads import poured_into
-from .options import checked_joints
+from .options import check_known, checked_joints
 from .placement import Leg
 from .pour_geometry import SOURCE, TARGET, level_hand
 from .pour_rules import PourProgress
 from .render import View
-from .robot_parts import robot_parts
 from .robots import robot_named
 from .rooms import arm_room
 from .sim import Start
-from .spaces import observation_space
 from .state import State
-from .task import TaskDescription, TaskObject
-from .things import TABLE_HEIGHT, Beads, Glass, Things
+from .things import Beads, Glass, Things
 
 ARMS = ("right", "left")
 """The right hand holds the source, the left one the target."""
@@ -69,7 +66,7 @@ RANGES = {
 """By the name of a layout, see `levels`; what the arms cannot reach is drawn anew."""
 
 
-class BimanualPourEnv(OneDemoEnv):
+class BimanualPourEnv(OneDemoEnv[PourProgress]):
     """Pour the beads of one glass into another, each held by one arm of Baxter from the start.
 
     ## Description
@@ -159,8 +156,11 @@ class BimanualPourEnv(OneDemoEnv):
         for glass in GLASSES:
             kind.check_grip(2.0 * glass.radius, robot, f"the {glass.name}")
         super().__init__(
+            name="bimanual_pour",
             robot=robot,
             things=Things(GLASSES, (), BEADS),
+            goals=1,
+            motions=2,
             level=level,
             obstacles=obstacles,
             control_mode=control_mode,
@@ -169,31 +169,10 @@ class BimanualPourEnv(OneDemoEnv):
             control_frequency=control_frequency,
             arms=ARMS,
             view=VIEW,
+            more={"bead_fraction": space.box(0.0, 1.0, (3,))},
         )
-        parts = robot_parts(robot, self.sim.scene)
-        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        more = {"bead_fraction": space.box(0.0, 1.0, (3,))}
-        self.observation_space = observation_space(self.arms, widths, 2, 1, 2, SLOTS, **more)
-        self._task = TaskDescription(
-            name="bimanual_pour",
-            robot=robot,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(glass) for glass in GLASSES),
-            bodies=parts.bodies,
-            table_height=TABLE_HEIGHT,
-            fixtures=parts.fixtures,
-            gripper_width=widths,
-            obstacles=SLOTS,
-            touching=parts.touching,
-        )
-        self._solids = pack(parts.fixtures)
+        self._solids = pack(self.task.fixtures)
         self._place(np.array(READY))
-
-    @property
-    def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
-        return self._task
 
     def _place(self, joints: np.ndarray) -> np.ndarray:
         """Take the start joints (2, dof); the poses (2, 7) of the glasses in the hands."""
@@ -208,9 +187,7 @@ class BimanualPourEnv(OneDemoEnv):
         return glasses
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        for key in options:
-            if key not in OPTIONS:
-                raise UnknownName("reset option", key, OPTIONS)
+        check_known(options, OPTIONS)
         joints = self._drawn(RANGES[layout])
         if "joint_positions" in options:
             joints = checked_joints(options["joint_positions"], self.arms)
@@ -255,17 +232,6 @@ class BimanualPourEnv(OneDemoEnv):
         turned = Pose.from_position_quaternion([0, 0, 0], hand.quaternion)
         before = above @ turned @ Pose.from_position_quaternion([0.0, 0.0, -0.1])
         return [Leg(hand, before, ((hand,), (before,)), GLASSES[SOURCE].shape, tcp_from_glass(SOURCE), motion=1)]
-
-    def _goals(self) -> tuple[np.ndarray, float]:
-        return self._goal_pose.copy(), self._progress.motion_index
-
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress = self._progress
-        verdict = progress.update(state)
-        if verdict.unwanted:
-            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or progress.failed, progress.info()
 
     def _more_observed(self, state: State) -> dict[str, np.ndarray]:
         return {"bead_fraction": self._progress.fractions}

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from ..planner.arm import Arm
-from ..planner.errors import BadOption
+from ..planner.errors import BadOption, UnknownName
+
+
+def check_known(options: Iterable[str], known: tuple[str, ...]) -> None:
+    """Refuse reset options that a task does not have.
+
+    Raises:
+        UnknownName: one is not among the known ones.
+    """
+    for key in options:
+        if key not in known:
+            raise UnknownName("reset option", key, known)
 
 
 def checked_array(option: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:

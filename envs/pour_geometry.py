@@ -15,6 +15,7 @@ from .things import Beads, Color, Furniture, Glass, Part
 SOURCE, TARGET = 0, 1
 """Indices of the two glasses."""
 GLASSES = (Glass("source", radius=0.030), Glass("target", radius=0.043))
+"""What the Panda pours from and into; other grippers may need another source, see `pour_places`."""
 BEADS = Beads()
 PLATE_RADIUS, PLATE, COLUMN_RADIUS, COLUMN = 0.05, 0.012, 0.022, 0.6
 """A stand's plate and column [m]; what of the column is too long is hidden in and below the table."""

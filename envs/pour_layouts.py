@@ -11,8 +11,6 @@ from ..planner.errors import BadOption
 from .options import checked_array
 from .things import TABLE_HEIGHT
 
-PLACES = ((-0.08, -0.18, 0.95), (0.0, 0.10, 0.95))
-"""Nominal x, y, z [m] of the stands' tops, source first."""
 LOWEST, HIGHEST = 0.10, 0.40
 """Of stands' tops above the table [m]."""
 GAP, LONG_GAP = 0.20, 0.30

@@ -13,6 +13,7 @@ import numpy as np
 from ..planner import screw
 from ..planner.jit import kernel
 from .pour_geometry import SOURCE, TARGET
+from .progress import Progress
 from .scene import ARM, BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OTHER_ARM, OTHER_FINGERS
 from .state import State
 from .things import TABLE_HEIGHT
@@ -23,7 +24,6 @@ UPRIGHT = np.deg2rad(10.0)
 """Largest tilt of a target that stands [rad]."""
 STILL = 0.01
 """A glass slower than this stands [m/s]."""
-SETTLED_SECONDS = 0.5
 LIFTED = 0.02
 """Height above its start at which the source counts as lifted [m]."""
 ARRIVED = 0.15
@@ -154,7 +154,7 @@ def judged(poses, velocities, beads, touching, sizes, memory):
     return inside, poured, lying, int(held), int(done), int(dropped), int(fallen), unwanted, low, high
 
 
-class PourProgress:
+class PourProgress(Progress):
     """What has happened in an episode so far, renewed from the simulator's state at each step.
 
     Args:
@@ -166,17 +166,10 @@ class PourProgress:
     """
 
     def __init__(self, start: np.ndarray, sizes: np.ndarray, beads: int, dt: float, *, in_hand: bool = False):
+        super().__init__(dt)
         self.count, self._sizes = beads, sizes
         self._memory = np.concatenate([start[SOURCE, :3], [float(in_hand)], np.zeros(3)])
-        self._needed, self._settled_steps = round(SETTLED_SECONDS / dt), 0
         self.verdict = Verdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
-        self.collisions = 0
-        self.collision = ""
-
-    @property
-    def success(self) -> bool:
-        """Enough beads have been in a standing target for long enough."""
-        return self._settled_steps >= self._needed
 
     @property
     def failed(self) -> bool:
@@ -205,7 +198,9 @@ class PourProgress:
 
     @property
     def failure(self) -> str:
-        """Why it cannot succeed as things are, "" if it can."""
+        """Why it cannot succeed as things are, "" if it can, or did."""
+        if self.success:
+            return ""
         if self.verdict.fallen:
             return "off_table"
         if self.verdict.dropped:
@@ -216,8 +211,7 @@ class PourProgress:
         """Take in a new state."""
         poses, moving, beads = state.object_pose, state.object_velocity, state.bead_position
         self.verdict = Verdict(*judged(poses, moving, beads, state.touching, self._sizes, self._memory))
-        self._settled_steps = self._settled_steps + 1 if self.verdict.done else 0
-        self.collisions += self.verdict.unwanted
+        self._settle(self.verdict.done == 1, self.verdict)
         return self.verdict
 
     def reward(self, state: State) -> float:
@@ -231,16 +225,10 @@ class PourProgress:
         poured = self.verdict.target / self.count
         return max(0.1 * reach + 0.1 * self.verdict.held + 0.2 * carry, 0.4 * (poured > 0.0)) + 0.5 * poured
 
-    def info(self) -> dict[str, Any]:
-        """The entries of `info`."""
-        success, (_, target, outside) = self.success, self.fractions
+    def numbers(self) -> dict[str, Any]:
+        """The task's own entries of `info`."""
+        _, target, outside = self.fractions
         return {
-            "is_success": success,
-            "success": success,
-            "safe": self.collisions == 0,
-            "stage": self.stage,
-            "failure_reason": "" if success else self.failure,
-            "collision": self.collision,
             "fraction_in_target": float(target),
             "fraction_outside": float(outside),
             "carry_tilt": float(self._memory[TILT]),

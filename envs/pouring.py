@@ -6,30 +6,26 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 from ..planner.ik import inverse_kinematics
 from ..planner.pose import Pose
 from ..planner.shapes import Obstacle, pack
 from . import spaces as space
-from .base import SLOTS, OneDemoEnv
+from .base import OneDemoEnv
 from .beads import poured_into
-from .bodies import robot_body
-from .options import checked_joints
+from .options import check_known, checked_joints
 from .placement import Leg
 from .pour_geometry import BACK, BEADS, GLASSES, SOURCE, STANDS, TARGET, TILTED, UP, grasp, pouring, tcp_from_glass
-from .pour_layouts import GAP, LONG_GAP, PLACES, RANGES, checked_stands, pour_layout
+from .pour_layouts import GAP, LONG_GAP, RANGES, checked_stands, pour_layout
+from .pour_places import POUR_PLACES
 from .pour_rules import PourProgress
 from .render import View
-from .robots import check_fit
+from .robots import places_of, robot_named
 from .rooms import arm_room
 from .sim import Start
-from .spaces import observation_space
 from .state import State
-from .task import TaskDescription, TaskFurniture, TaskObject
-from .things import TABLE_HEIGHT, Things
+from .things import Things
 
-READY = (-0.971, 0.844, -0.068, -1.470, 1.031, 1.012, -1.705)
-"""The Panda's joints at the start [rad]: the hand level, in front of the source, pointing along yaw 75 degrees."""
 OPTIONS = ("level", "obstacles", "stands", "joint_positions")
 RAISED, ABOVE = 0.12, (0.0, 0.04, 0.08)
 """Heights [m] above the grasp: of a leg's beginning, and at which the hand must find room beside obstacles."""
@@ -43,18 +39,18 @@ MAX_STARTS = 200
 VIEW = View((-0.14, -0.02, 1.06), 1.42, 150.0, -17.0)
 
 
-class PourEnv(OneDemoEnv):
+class PourEnv(OneDemoEnv[PourProgress]):
     """Pour the beads of one glass into another with one arm.
 
     ## Description
-    Two glasses stand on stands on a table: the source (60 mm wide, 100 mm high, 80 g), which holds 30 beads of 12 mm
-    and 1 g that stand for water, and the target (86 mm wide, as high). The source must be fetched, carried and
-    emptied into the target. It is held by friction between the fingers only, beads fall because they are heavy.
-    Success is judged from the simulator: at least 90 % of the beads in the target, at most 5 % outside both glasses,
-    the target upright and at rest, for half a second.
+    Two glasses stand on stands on a table: the source (60 mm wide, 100 mm high, 80 g; 46 mm wide where a gripper holds
+    or clears no wider one), which holds 30 beads of 12 mm and 1 g that stand for water, and the target (86 mm wide, as
+    high). The source must be fetched, carried and emptied into the target. It is held by friction between the fingers
+    only, beads fall because they are heavy. Success is judged from the simulator: at least 90 % of the beads in the
+    target, at most 5 % outside both glasses, the target upright and at rest, for half a second.
 
     ## Action Space
-    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
 
     | control mode | entry | meaning |
     |---|---|---|
@@ -89,8 +85,8 @@ class PourEnv(OneDemoEnv):
     holding and carrying the source, kept once beads are poured; 1 with success. `reward="sparse"`: 1 with success.
 
     ## Starting State
-    By `level`: L0 the nominal places; L1 the source moved by up to 5 cm and the target by up to 10 cm in x and y,
-    start joints by up to 0.05 rad; L2 by 15 cm, 20 cm and 0.15 rad, each stand 10 to 30 cm high instead of 15. The
+    By `level`: L0 the robot's nominal places; L1 the source moved by up to 5 cm and the target by up to 10 cm in x and
+    y, start joints by up to 0.05 rad; L2 by 15 cm, 20 cm and 0.15 rad, each stand 10 to 30 cm high instead of 15. The
     glasses' axes are at least 20 cm apart and 0.35 to 0.72 m from the arm's base axis, the arm at least 3 cm from
     everything. There is no yaw to draw: a round glass looks the same from everywhere. With `pregrasped=True` the
     fingers are closed round the source where it stands.
@@ -112,12 +108,12 @@ class PourEnv(OneDemoEnv):
     target's axis) and `beads_lost` (most beads outside both glasses until then).
 
     ## Arguments
-    `robot="Panda"`, `pregrasped=False`, `stands=None` or (2, 3) nominal x, y, z [m] of the stands' tops, source
-    first, `ready=None` or (7,) nominal start joints [rad], `level="L1"`, `obstacles=None` (what the level says) or
-    `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
-    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `stands` (2, 3) exact tops of
-    the stands, and `joint_positions` (7,).
+    `robot="Panda"` (others: `onedemo.envs.pour_places.POUR_PLACES`; of Baxter the right arm), `pregrasped=False`,
+    `stands=None` or (2, 3) nominal x, y, z [m] of the stands' tops, source first, `ready=None` or (7,) nominal start
+    joints [rad], `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" |
+    "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
+    `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles`
+    (a kind, or a list of `Intruder`), `stands` (2, 3) exact tops of the stands, and `joint_positions` (7,).
 
     ## Version History
     * v0: first version.
@@ -138,10 +134,15 @@ class PourEnv(OneDemoEnv):
     ):
         if not isinstance(pregrasped, bool):
             raise BadOption("pregrasped", f"{pregrasped!r} is neither True nor False")
-        check_fit(robot, ("Panda",), "Pour")
+        places = places_of(POUR_PLACES, robot, "pour")
+        robot_named(robot).check_grip(2.0 * places.source.radius, robot, "the source")
+        self._glasses = (places.source, GLASSES[TARGET])
         super().__init__(
+            name="pour",
             robot=robot,
-            things=Things(GLASSES, STANDS, BEADS),
+            things=Things(self._glasses, STANDS, BEADS),
+            goals=1,
+            motions=2,
             level=level,
             obstacles=obstacles,
             control_mode=control_mode,
@@ -149,52 +150,30 @@ class PourEnv(OneDemoEnv):
             render_mode=render_mode,
             control_frequency=control_frequency,
             view=VIEW,
+            more={"furniture_pose": space.pose_box(2), "bead_fraction": space.box(0.0, 1.0, (3,))},
         )
         self.pregrasped = pregrasped
-        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        self._nominal = checked_stands(PLACES if stands is None else stands, self._axis)
-        self._ready = checked_joints(READY if ready is None else ready, self.arms)
-        more = {"furniture_pose": space.pose_box(2), "bead_fraction": space.box(0.0, 1.0, (3,))}
-        self.observation_space = observation_space(self.arms, widths, 2, 1, 2, SLOTS, **more)
-        self._task = TaskDescription(
-            name="pour",
-            robot=robot,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(glass) for glass in GLASSES),
-            bodies=tuple(robot_body(robot, k) for k in range(len(self.arms))),
-            table_height=TABLE_HEIGHT,
-            fixtures=self.sim.scene.fixtures,
-            gripper_width=widths,
-            furniture=tuple(TaskFurniture.of(each) for each in STANDS),
-            obstacles=SLOTS,
-        )
+        self._nominal = checked_stands(places.stands if stands is None else stands, self._axis)
+        self._ready = checked_joints(places.ready if ready is None else ready, self.arms)
         self._place(self._nominal)
 
     @property
-    def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
-        return self._task
-
-    @property
     def _axis(self) -> np.ndarray:
-        return np.array(self.sim.model.body("robot0_base").pos[:2])
+        return self.arms[0].chain[0, 4:6]
 
     def _place(self, stands: np.ndarray) -> np.ndarray:
         """Take the tops (2, 3) of the stands; the poses (2, 7) of the glasses on them."""
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-        heights = np.array([[0.0, 0.0, glass.height] for glass in GLASSES])
+        heights = np.array([[0.0, 0.0, glass.height] for glass in self._glasses])
         self._furniture = np.column_stack([stands, upright])
         self._goal_pose = np.append(stands[TARGET] + heights[TARGET], upright[0])[None]
         glasses = np.column_stack([stands + 0.5 * heights, upright])
-        sizes = np.array([[glass.radius, glass.height] for glass in GLASSES])
+        sizes = np.array([[glass.radius, glass.height] for glass in self._glasses])
         self._progress = PourProgress(glasses, sizes, BEADS.count, self.control_dt)
         return glasses
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        for key in options:
-            if key not in OPTIONS:
-                raise UnknownName("reset option", key, OPTIONS)
+        check_known(options, OPTIONS)
         given = checked_stands(options["stands"], self._axis) if "stands" in options else None
         wanted = checked_joints(options["joint_positions"], self.arms) if "joint_positions" in options else None
         ranges = RANGES[layout]
@@ -209,8 +188,8 @@ class PourEnv(OneDemoEnv):
 
     def _started_at(self, tops: np.ndarray, joints: np.ndarray) -> Start:
         glasses = self._place(tops)
-        beads = poured_into(glasses[SOURCE], GLASSES[SOURCE], BEADS)
-        grips = np.array([2.0 * GLASSES[SOURCE].radius]) if self.pregrasped else None
+        beads = poured_into(glasses[SOURCE], self._glasses[SOURCE], BEADS)
+        grips = np.array([2.0 * self._glasses[SOURCE].radius]) if self.pregrasped else None
         return Start(joints, glasses, self._furniture.copy(), beads, grips=grips)
 
     def _joints(self, tops: np.ndarray, offsets: np.ndarray) -> np.ndarray | None:
@@ -218,11 +197,11 @@ class PourEnv(OneDemoEnv):
         arm = self.arms[0]
         if not self.pregrasped:
             return np.clip(self._ready + offsets, arm.lower, arm.upper)
-        center = tops[SOURCE] + [0.0, 0.0, 0.5 * GLASSES[SOURCE].height]
+        center = tops[SOURCE] + [0.0, 0.0, 0.5 * self._glasses[SOURCE].height]
         approach = arm.fk(self._ready[0]).rotation[:2, 2]
         yaw = np.arctan2(approach[1], approach[0])
         for turn in TURNS:
-            q = inverse_kinematics(arm, grasp(GLASSES[SOURCE], center, yaw + turn), self._ready[0])
+            q = inverse_kinematics(arm, grasp(self._glasses[SOURCE], center, yaw + turn), self._ready[0])
             if q is not None and arm.margin(q) >= MARGIN:
                 return q[None]
         return None
@@ -232,13 +211,13 @@ class PourEnv(OneDemoEnv):
         solids = []
         for k in range(int(self.pregrasped), 2):
             at = Pose.from_position_quaternion(tops[k])
-            top = Pose.from_position_quaternion([0.0, 0.0, 0.5 * GLASSES[k].height])
-            solids += [*self._task.furniture[k].at(at), Obstacle(GLASSES[k].shape, at @ top)]
+            top = Pose.from_position_quaternion([0.0, 0.0, 0.5 * self._glasses[k].height])
+            solids += [*self._task.furniture[k].at(at), Obstacle(self._glasses[k].shape, at @ top)]
         return arm_room(self.arms[0], self._task.bodies[0], joints[0], pack(solids)) >= START_ROOM
 
     def _legs(self, start: Start) -> list[Leg]:
         """The carry: from above the source's stand to before the target, turned with the arm."""
-        glass, rim, center = GLASSES[SOURCE], self._goal_pose[0, :3], start.objects[SOURCE, :3]
+        glass, rim, center = self._glasses[SOURCE], self._goal_pose[0, :3], start.objects[SOURCE, :3]
         hand = grasp(glass, center, self._yaw_at(center, SOURCE))
         yaw = self._yaw_at(rim, TARGET)
         above = [Pose.from_position_quaternion([0.0, 0.0, up]) @ hand for up in (*ABOVE, RAISED)]
@@ -252,17 +231,6 @@ class PourEnv(OneDemoEnv):
         was, now = self._nominal[glass, :2] - self._axis, place[:2] - self._axis
         turned = np.arctan2(now[1], now[0]) - np.arctan2(was[1], was[0])
         return float(np.arctan2(approach[1], approach[0]) + turned)
-
-    def _goals(self) -> tuple[np.ndarray, float]:
-        return self._goal_pose.copy(), self._progress.motion_index
-
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress = self._progress
-        verdict = progress.update(state)
-        if verdict.unwanted:
-            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or progress.failed, progress.info()
 
     def _more_observed(self, state: State) -> dict[str, np.ndarray]:
         return {"furniture_pose": self._furniture.copy(), "bead_fraction": self._progress.fractions}

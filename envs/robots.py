@@ -6,13 +6,16 @@ and Sawyer, KUKA LBR iiwa 7 R800, Universal Robots UR5e, Kinova Gen3.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from ..planner.errors import BadOption, UnknownName
 
 Joints = tuple[float, ...]
+Places = TypeVar("Places")
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,7 @@ class Robot:
     Attributes:
         speeds: (dof,) largest joint speeds [rad/s].
         grip: widths [m] of what the gripper can hold: from what its pads close on to what passes between them.
+        opening: widest gap between the pads of its gripper [m].
         ready: per arm the joints [rad] from which the table is reached well; the first arm is the usual one.
         stand: x of its base [m]; None: where robosuite puts it.
         beside: how far [m] the base stands beside the table's middle line when one of two arms works, so that this
@@ -34,6 +38,7 @@ class Robot:
 
     speeds: Joints
     grip: tuple[float, float]
+    opening: float
     ready: dict[str, Joints]
     stand: float | None = None
     beside: float = 0.0
@@ -72,11 +77,13 @@ class Robot:
 
 
 PANDA_READY = (0.0, np.pi / 16.0, 0.0, -np.pi / 2.0 - np.pi / 3.0, 0.0, np.pi - 0.2, np.pi / 4)
+PANDA_GRIP, RETHINK_GRIP = ((0.002, 0.075), 0.079), ((0.016, 0.056), 0.0601)
+"""What the two grippers can hold and how far they open [m]."""
 ROBOTS = {
-    "Panda": Robot((2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61), (0.002, 0.075), {"right": PANDA_READY}),
+    "Panda": Robot((2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61), *PANDA_GRIP, {"right": PANDA_READY}),
     "Baxter": Robot(
         (2.0, 2.0, 2.0, 2.0, 4.0, 4.0, 4.0),
-        (0.016, 0.056),
+        *RETHINK_GRIP,
         {
             "right": (0.205, -1.095, 0.779, 1.885, -0.408, 0.946, 0.387),
             "left": (-0.205, -1.095, -0.779, 1.885, 0.408, 0.946, -0.387),
@@ -91,24 +98,24 @@ ROBOTS = {
     ),
     "Sawyer": Robot(
         (1.74, 1.328, 1.957, 1.957, 3.485, 3.485, 4.545),
-        (0.016, 0.056),
+        *RETHINK_GRIP,
         {"right": (0.354, -0.583, -0.9, 1.825, 1.02, 0.875, 0.686)},
     ),
     "IIWA": Robot(
         (1.71, 1.71, 1.75, 2.27, 2.44, 3.14, 3.14),
-        (0.002, 0.075),
+        *PANDA_GRIP,
         {"right": (0.0, 0.56, 0.0, -1.529, 0.0, 1.052, 0.0)},
         gripper="PandaGripper",
     ),
     "UR5e": Robot(
         (3.14, 3.14, 3.14, 3.14, 3.14, 3.14),
-        (0.002, 0.075),
+        *PANDA_GRIP,
         {"right": (-0.47, -1.735, 2.48, -2.275, -1.59, -1.991)},
         gripper="PandaGripper",
     ),
     "Kinova3": Robot(
         (1.39, 1.39, 1.39, 1.39, 1.22, 1.22, 1.22),
-        (0.002, 0.075),
+        *PANDA_GRIP,
         {"right": (-0.057, 0.722, 0.023, 1.312, -0.017, 1.108, -1.603)},
         gripper="PandaGripper",
     ),
@@ -127,13 +134,20 @@ def robot_named(name: object) -> Robot:
     return ROBOTS[name]
 
 
-def check_fit(robot: object, fit: tuple[str, ...], task: str) -> None:
-    """Refuse a robot that a task's places were not made for.
+def places_of(table: Mapping[str, Places | str], robot: object, task: str) -> Places:
+    """Where a robot does a task.
+
+    Args:
+        table: by robot its places, or the reason that it has none.
+        robot: its name.
+        task: what it is to do, for messages.
 
     Raises:
         UnknownName: no such robot.
-        BadOption: it is known, but does not fit.
+        BadOption: it is known, but cannot do this.
     """
     robot_named(robot)
-    if robot not in fit:
-        raise BadOption("robot", f"{robot} cannot do {task}, whose places are made for: {', '.join(fit)}")
+    found = table.get(str(robot), "no places were made for it")
+    if isinstance(found, str):
+        raise BadOption("robot", f"{robot} cannot {task}: {found}")
+    return found

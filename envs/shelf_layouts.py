@@ -8,14 +8,9 @@ import numpy as np
 
 from ..planner.pose import Pose
 from .shelf_parts import CLUTTER, PITCH, clutter_poses, handed, slot, waiting
+from .shelf_places import ShelfPlaces
 from .things import TABLE_HEIGHT
 
-STAND = (0.15, -0.30, 1.15)
-"""Nominal middle of the stand's top [m]."""
-STAND_YAW, CUPBOARD_YAW = np.deg2rad(30.0), np.deg2rad(75.0)
-"""Ways in which a book is taken and inserted. Straight ahead, a Panda cannot insert anything by 20 cm."""
-CUPBOARD = (-0.009, 0.116)
-"""Nominal middle of the cupboard's front [m]."""
 WALL_GAP, FRONT_GAP = 0.002, 0.012
 """Least distances of the clutter [m]."""
 MOST_BOOKS = 3
@@ -69,6 +64,7 @@ class ShelfLayout:
     Attributes:
         stand: the stand; x along the way in which a book is taken.
         cupboard: the cupboard.
+        pile: x, y of the books that wait [m].
         slots: shift of the middle of the slots along the shelf [m].
         books: (n, 3) x, y [m] and yaw [rad] of each book on the stand, from its nominal place there.
         clutter: (n, 2) gaps of the clutter, see `clutter_poses`.
@@ -77,6 +73,7 @@ class ShelfLayout:
 
     stand: Pose
     cupboard: Pose
+    pile: tuple[float, float]
     slots: float
     books: np.ndarray
     clutter: np.ndarray
@@ -89,7 +86,7 @@ class ShelfLayout:
     def objects(self) -> np.ndarray:
         """(n, 7) all books at the start: the first on the stand, the others in the pile, the last at its bottom."""
         count = len(self.books)
-        poses = [self.handed(0), *(waiting(count - 1 - k) for k in range(1, count))]
+        poses = [self.handed(0), *(waiting(self.pile, count - 1 - k) for k in range(1, count))]
         poses += [self.cupboard @ pose for pose in clutter_poses(self.clutter)]
         return np.array([pose.vector for pose in poses])
 
@@ -106,17 +103,20 @@ class ShelfLayout:
         return np.array([(self.cupboard @ slot(shelf, each)).vector for each in along])
 
 
-def shelf_layout(rng: np.random.Generator, ranges: Ranges, count: int, joints: tuple[int, ...]) -> ShelfLayout:
+def shelf_layout(
+    rng: np.random.Generator, ranges: Ranges, places: ShelfPlaces, count: int, joints: tuple[int, ...]
+) -> ShelfLayout:
     """A layout of `count` books, drawn from its ranges; `joints` is the shape (n_arms, dof) of the start joints."""
-    x, y = STAND[:2] + rng.uniform(-ranges.stand, ranges.stand, 2)
-    z = STAND[2] + rng.uniform(-ranges.lower, ranges.higher)
-    yaw = STAND_YAW + rng.uniform(-ranges.stand_yaw, ranges.stand_yaw)
-    front = CUPBOARD + rng.uniform(-ranges.cupboard, ranges.cupboard, 2)
-    turned = CUPBOARD_YAW + rng.uniform(-ranges.cupboard_yaw, ranges.cupboard_yaw)
+    x, y = places.stand[:2] + rng.uniform(-ranges.stand, ranges.stand, 2)
+    z = places.stand[2] + rng.uniform(-ranges.lower, ranges.higher)
+    yaw = places.stand_yaw + rng.uniform(-ranges.stand_yaw, ranges.stand_yaw)
+    front = places.cupboard + rng.uniform(-ranges.cupboard, ranges.cupboard, 2)
+    turned = places.cupboard_yaw + rng.uniform(-ranges.cupboard_yaw, ranges.cupboard_yaw)
     limits = np.array([ranges.book, ranges.book, ranges.book_yaw])
     return ShelfLayout(
         stand=Pose.from_yaw([x, y, z], yaw),
         cupboard=Pose.from_yaw([*front, TABLE_HEIGHT], turned),
+        pile=places.pile,
         slots=rng.uniform(-ranges.slots, ranges.slots),
         books=rng.uniform(-limits, limits, (count, 3)),
         clutter=np.array([WALL_GAP, FRONT_GAP]) + rng.uniform(0.0, ranges.clutter, (len(CLUTTER), 2)),

@@ -10,35 +10,46 @@ import numpy as np
 from ..planner.errors import BadOption
 from ..planner.pose import Pose
 from .options import checked_array, checked_poses
-from .shelf_layouts import CUPBOARD, CUPBOARD_YAW, STAND, STAND_YAW, ShelfLayout
+from .shelf_layouts import ShelfLayout
 from .shelf_parts import BOOK_SIZE, CLUTTER, PITCH, SHELVES, WIDTH
+from .shelf_places import ShelfPlaces
 from .things import TABLE_HEIGHT
 
-OPTIONS = ("level", "obstacles", "stand_pose", "cupboard_pose", "slots", "clutter", "joint_positions")
+OPTIONS = ("level", "obstacles", "stand_pose", "cupboard_pose", "slots", "books", "clutter", "joint_positions")
 STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN = 0.12, 0.15, 0.10, np.deg2rad(45.0)
 """How far a given stand may be from the nominal one [m, rad]."""
 CUPBOARD_WAY, CUPBOARD_TURN = 0.05, np.deg2rad(20.0)
 """How far a given cupboard may be from the nominal one [m, rad]: it stands on the table, within reach."""
+LOWEST_STAND = 1.0
+"""z [m] of the stand's top below which its tube would come through the plate."""
+BOOK_WAY = np.array([0.015, 0.03, np.deg2rad(20.0)])
+"""How far a given book may lie from the middle of the stand, x, y [m] and yaw [rad]: it lies safely, fingers fit in."""
 BESIDE = 0.03
 """Least room [m] for a finger beside a book that is let go."""
 
 
-def given_layout(drawn: ShelfLayout, options: dict[str, Any]) -> ShelfLayout:
+def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlaces) -> ShelfLayout:
     """The layout drawn, changed by what is given.
 
     Raises:
-        BadOption: a stand or a cupboard that is out of reach, off the table or tilted; slots or clutter that are
-            inside each other or the cupboard.
+        BadOption: a stand or a cupboard that is out of reach, off the table or tilted; books that do not lie on the
+            stand; slots or clutter that are inside each other or the cupboard.
     """
     changes: dict[str, Any] = {}
     if "stand_pose" in options:
-        nominal, way = (STAND, STAND_YAW), (STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN)
+        lower = min(STAND_LOWER, places.stand[2] - LOWEST_STAND)
+        nominal, way = (places.stand, places.stand_yaw), (STAND_WAY, lower, STAND_HIGHER, STAND_TURN)
         changes["stand"] = _standing("stand_pose", options["stand_pose"], nominal, way)
     if "cupboard_pose" in options:
-        nominal, way = ((*CUPBOARD, TABLE_HEIGHT), CUPBOARD_YAW), (CUPBOARD_WAY, 0.001, 0.001, CUPBOARD_TURN)
+        nominal, way = (
+            ((*places.cupboard, TABLE_HEIGHT), places.cupboard_yaw),
+            (CUPBOARD_WAY, 0.001, 0.001, CUPBOARD_TURN),
+        )
         changes["cupboard"] = _standing("cupboard_pose", options["cupboard_pose"], nominal, way)
     if "slots" in options:
         changes["slots"] = float(checked_array("slots", options["slots"], ()))
+    if "books" in options:
+        changes["books"] = _lying(options["books"], len(drawn.books))
     if "clutter" in options:
         changes["clutter"] = checked_array("clutter", options["clutter"], (len(CLUTTER), 2))
     layout = replace(drawn, **changes)
@@ -61,6 +72,19 @@ def _standing(option: str, value: Any, nominal: tuple[Any, float], way: tuple[fl
         degrees = f"{np.degrees(yaw):.0f} by {np.degrees(turn):.0f} degrees"
         raise BadOption(option, f"yaw of {np.degrees(pose.yaw):.0f} degrees cannot be reached; allowed: {degrees}")
     return pose
+
+
+def _lying(value: Any, count: int) -> np.ndarray:
+    """Places (count, 3) on the stand."""
+    books = checked_array("books", value, (count, 3))
+    for k, off in enumerate(np.abs(books)):
+        if (off > BOOK_WAY).any():
+            x, y, yaw = BOOK_WAY
+            allowed = f"x by {x:g} m, y by {y:g} m, yaw by {yaw:.2f} rad"
+            raise BadOption(
+                "books", f"book {k} at {np.round(books[k], 3).tolist()} would not lie on the stand; {allowed}"
+            )
+    return books
 
 
 def _check_room(layout: ShelfLayout) -> None:

@@ -25,8 +25,6 @@ OVERHANG = 0.05
 """Of a book's spine over the stand [m]: room for the fingers."""
 TURNED = (0.5**0.5, 0.5**0.5, 0.0, 0.0)
 """A book that lies (wxyz): its x stays, its back cover is up."""
-PILE = (-0.21, -0.27)
-"""Where books wait, on the table [m]: beside the stand, below the arm."""
 PILE_YAW = 1.0
 WOOD: Color = (0.76, 0.58, 0.39, 1.0)
 DARK_WOOD: Color = (0.58, 0.41, 0.26, 1.0)
@@ -94,11 +92,11 @@ def handed(offset: np.ndarray) -> Pose:
     return turned @ Pose.from_position_quaternion([0, 0, 0], TURNED)
 
 
-def waiting(order: int) -> Pose:
-    """A book in the pile on the table, `order` from the bottom, in the world."""
+def waiting(pile: tuple[float, float], order: int) -> Pose:
+    """A book in the pile at a place (x, y) on the table [m], `order` from the bottom, in the world."""
     height = TABLE_HEIGHT + (order + 0.5) * BOOK_SIZE[1]
     lying = Pose.from_position_quaternion([0, 0, 0], TURNED)
-    return Pose.from_yaw([*PILE, height], PILE_YAW + 0.12 * order) @ lying
+    return Pose.from_yaw([*pile, height], PILE_YAW + 0.12 * order) @ lying
 
 
 def clutter_poses(gaps: np.ndarray) -> list[Pose]:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..planner.jit import kernel
+from .progress import Progress
 from .scene import ARM, FINGERS, FIRST_OBJECT, FURNITURE, WORLD
 from .state import State
 from .things import TABLE_HEIGHT
@@ -21,7 +22,6 @@ STILL = 0.01
 """A book slower than this is at rest [m/s]."""
 WITHDRAWN = 0.15
 """Distance of the tcp to every shelved book's center from which on the hand has withdrawn [m]."""
-SETTLED_SECONDS = 0.5
 LOST = 0.04
 """A book that was lifted and now rests farther than this from its slot was dropped [m]."""
 LOWEST = TABLE_HEIGHT - 0.05
@@ -159,7 +159,7 @@ def shaped(poses, goals, tcp, placed, held):
     return (placed + part) / n
 
 
-class ShelveProgress:
+class ShelveProgress(Progress):
     """What has happened in an episode so far, renewed from the simulator's state at each step.
 
     Args:
@@ -169,10 +169,9 @@ class ShelveProgress:
     """
 
     def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float):
+        super().__init__(dt)
         self.n_books = len(goals)
         self._goals, self._start = goals, start.copy()
-        self._needed = round(SETTLED_SECONDS / dt)
-        self._settled_steps = 0
         self._lifted = np.zeros(self.n_books)
         self._errors = np.zeros((2, self.n_books))
         self._best_stage = 0
@@ -181,9 +180,7 @@ class ShelveProgress:
         self.handed = 1
         self.held = False
         self.toppled = False
-        self.collisions = 0
-        self.collision = ""
-        self.failure = ""
+        self._failure = ""
 
     @property
     def motion_index(self) -> float:
@@ -191,9 +188,19 @@ class ShelveProgress:
         return float(2 * self.placed + self.held)
 
     @property
-    def success(self) -> bool:
-        """All books have been in their slots, at rest and let go for long enough, and no clutter was pushed over."""
-        return self._settled_steps >= self._needed
+    def failed(self) -> bool:
+        """A book is off the table."""
+        return self._failure == "off_table"
+
+    @property
+    def stage(self) -> str:
+        """The furthest progress in words."""
+        return self._stages[self._best_stage]
+
+    @property
+    def failure(self) -> str:
+        """Why it cannot succeed as things are, "" if it can."""
+        return self._failure
 
     def hand_over(self, pose: np.ndarray) -> None:
         """The next book now lies at a pose (7,) on the stand."""
@@ -207,27 +214,19 @@ class ShelveProgress:
         known = (self._goals, self._start, self.handed, self._lifted, self._errors)
         verdict = Verdict(*judged(poses, moving, tcp, state.touching, *known))
         self.placed, self.held, self.toppled = verdict.placed, verdict.held == 1, verdict.toppled == 1
-        self._settled_steps = self._settled_steps + 1 if verdict.settled else 0
+        self._settle(verdict.settled == 1, verdict)
         self._best_stage = max(self._best_stage, 2 * verdict.placed + verdict.raised)
-        self.collisions += verdict.unwanted
         rules = (("off_table", verdict.fallen), ("dropped", verdict.lost), ("constraint", verdict.toppled))
-        self.failure = next((name for name, broken in rules if broken), "")
+        self._failure = next((name for name, broken in rules if broken), "")
         return verdict
 
     def reward(self, state: State) -> float:
         """The dense reward of the state taken in last."""
         return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
-    def info(self) -> dict[str, Any]:
-        """The entries of `info`."""
-        success = self.success
+    def numbers(self) -> dict[str, Any]:
+        """The task's own entries of `info`."""
         return {
-            "is_success": success,
-            "success": success,
-            "safe": self.collisions == 0,
-            "stage": self._stages[self._best_stage],
-            "failure_reason": self.failure,
-            "collision": self.collision,
             "books_placed": self.placed,
             "position_error": self._errors[0],
             "angle_error": self._errors[1],

@@ -6,29 +6,26 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 from ..planner.pose import Pose
 from ..planner.shapes import Box, Obstacle, pack
-from .base import MAX_LAYOUTS, SLOTS, Observation, OneDemoEnv, checked_choice
-from .bodies import robot_body
-from .options import checked_joints
+from .base import MAX_LAYOUTS, Observation, OneDemoEnv, checked_choice
+from .options import check_known, checked_joints
 from .placement import Leg, Order
 from .render import Ghost, View
-from .robots import check_fit
+from .robots import places_of, robot_named
 from .rooms import arm_room
 from .shelf_layouts import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
 from .shelf_options import OPTIONS, given_layout
 from .shelf_parts import BOOK_SIZE, SHELVES, books, cupboard, stand
+from .shelf_places import SHELF_PLACES
 from .shelve_rules import ShelveProgress
 from .sim import Start
-from .spaces import observation_space, pose_box
+from .spaces import pose_box
 from .state import State
-from .task import TaskDescription, TaskFurniture, TaskObject
-from .things import TABLE_HEIGHT, Things
+from .things import Things
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
-READY = {"Panda": (-0.435, 0.580, -0.670, -1.869, 1.843, 1.350, 0.048)}
-"""Start joints [rad]: the hand level before the stand, fingers above each other; other robots start at home."""
 LIFT, WAY_IN = 0.15, 0.22
 """Heights above the stand and way before the slot at the ends of a carry [m]."""
 GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
@@ -44,14 +41,14 @@ PAPER_SIZES = (0.06, 0.09)
 """Of the obstacles that appear while the second and the third book are placed [m]."""
 
 
-class ShelveEnv(OneDemoEnv):
+class ShelveEnv(OneDemoEnv[ShelveProgress]):
     """Shelve three books in the upper shelf of a cluttered cupboard, with one arm.
 
     ## Description
-    A cupboard with two shelves stands on a table, turned so that books go in along a yaw of about 75 degrees; other
-    books stand in it. Three books (160 x 220 x 35 mm, 0.3 kg) are handed over one at a time on a stand at about
-    shelf height, lying, spine over its edge. They must be put upright, spine to the front, into three slots 70 mm
-    apart. They are held by friction between the fingers only.
+    A cupboard with two shelves stands on a table, turned so that the robot reaches it: for the Panda, books go in
+    along a yaw of about 75 degrees; other books stand in it. Three books (160 x 220 x 35 mm, 0.3 kg) are handed over
+    one at a time on a stand at about shelf height, lying, spine over its edge. They must be put upright, spine to the
+    front, into three slots 70 mm apart. They are held by friction between the fingers only.
 
     Handing over is the human's part, and the environment plays it: books that are not handed over yet wait in a
     pile on the table, and when book k is in its slot, let go, and the whole robot is 8 cm away from its place, the
@@ -63,7 +60,7 @@ class ShelveEnv(OneDemoEnv):
     half a second.
 
     ## Action Space
-    `Box(-1, 1, (8,), float64)` for the Panda, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
 
     | control mode | entry | meaning |
     |---|---|---|
@@ -99,7 +96,7 @@ class ShelveEnv(OneDemoEnv):
     By `level`: L0 the nominal places; L1 the stand moved by up to 4 cm, 5 cm lower to 2.5 cm higher, turned by up to
     10 degrees, the cupboard by up to 1 cm and 5 degrees, the slots by up to 15 mm along the shelf, books by up to
     3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 15
-    degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. These ranges are what the Panda reaches.
+    degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. Each robot has its own nominal places.
 
     L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way from stand to cupboard,
     L4 one that swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the
@@ -117,13 +114,15 @@ class ShelveEnv(OneDemoEnv):
     `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
 
     ## Arguments
-    `robot="Panda"`, `n_books=3` (1 to 3), `shelf="upper" | "lower"` (the demonstration was given in the lower one),
-    `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
-    "forearm" | "paper"` (two of different size appear while the last two books are carried),
-    `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`, `control_frequency=50`,
-    `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of
-    `Intruder`), `stand_pose` (7,), `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `clutter` (5, 2: gaps
-    [m] from neighbor or wall, and from the front) and `joint_positions` (7,).
+    `robot="Panda"` (others: `onedemo.envs.shelf_places.SHELF_PLACES`; of Baxter the right arm), `n_books=3` (1 to 3),
+    `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`, `obstacles=None` (what the
+    level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"` (two of different
+    size appear while the last two books are carried), `control_mode="joint_velocity" | "ee_twist"`,
+    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
+    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `stand_pose` (7,),
+    `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `books` (n, 3: x, y [m] and yaw [rad] of each on the
+    stand, from its middle), `clutter` (5, 2: gaps [m] from neighbor or wall, and from the front) and
+    `joint_positions` (7,).
 
     ## Version History
     * v0: first version.
@@ -145,10 +144,14 @@ class ShelveEnv(OneDemoEnv):
             raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
         self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
         objects, furniture = books(n_books), (cupboard(), *stand())
-        check_fit(robot, ("Panda",), "Shelve")
+        self._places = places_of(SHELF_PLACES, robot, "shelve")
+        robot_named(robot).check_grip(BOOK_SIZE[1], robot, "a book")
         super().__init__(
+            name="shelve",
             robot=robot,
             things=Things(objects, furniture),
+            goals=n_books,
+            motions=2 * n_books,
             level=level,
             obstacles=obstacles,
             control_mode=control_mode,
@@ -156,32 +159,11 @@ class ShelveEnv(OneDemoEnv):
             render_mode=render_mode,
             control_frequency=control_frequency,
             view=VIEW,
+            more={"furniture_pose": pose_box(len(furniture))},
         )
-        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        counts = (len(objects), n_books, 2 * n_books, SLOTS)
-        self.observation_space = observation_space(self.arms, widths, *counts, furniture_pose=pose_box(len(furniture)))
-        self._task = TaskDescription(
-            name="shelve",
-            robot=robot,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(book) for book in objects),
-            bodies=tuple(robot_body(robot, k) for k in range(len(self.arms))),
-            table_height=TABLE_HEIGHT,
-            fixtures=self.sim.scene.fixtures,
-            gripper_width=widths,
-            furniture=tuple(TaskFurniture.of(each) for each in furniture),
-            obstacles=SLOTS,
-        )
-        home = self.sim.scene.home
-        self._ready = np.array([READY[robot]]) if robot in READY else home
-        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], n_books, home.shape)
+        self._ready = np.array([self._places.ready])
+        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], self._places, n_books, self._ready.shape)
         self._take_layout(self._drawn)
-
-    @property
-    def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
-        return self._task
 
     def _take_layout(self, drawn: ShelfLayout) -> None:
         self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
@@ -189,9 +171,7 @@ class ShelveEnv(OneDemoEnv):
         self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        for key in options:
-            if key not in OPTIONS:
-                raise UnknownName("reset option", key, OPTIONS)
+        check_known(options, OPTIONS)
         drawn, joints = self._drawn_clear(options, layout)
         self._take_layout(drawn)
         return Start(joints, drawn.objects(), self._furniture)
@@ -200,8 +180,8 @@ class ShelveEnv(OneDemoEnv):
         """A layout and start joints at which the hand is not already at the book."""
         lower, upper = [arm.lower for arm in self.arms], [arm.upper for arm in self.arms]
         for _ in range(MAX_LAYOUTS):
-            drawn = shelf_layout(self.np_random, RANGES[layout], self.n_books, self._ready.shape)
-            drawn = given_layout(drawn, options)
+            drawn = shelf_layout(self.np_random, RANGES[layout], self._places, self.n_books, self._ready.shape)
+            drawn = given_layout(drawn, options, self._places)
             if "joint_positions" in options:
                 return drawn, checked_joints(options["joint_positions"], self.arms)
             joints = np.clip(self._ready + drawn.joints, lower, upper)
@@ -251,16 +231,5 @@ class ShelveEnv(OneDemoEnv):
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose[self._progress.placed :]]
 
-    def _goals(self) -> tuple[np.ndarray, float]:
-        return self._goal_pose.copy(), self._progress.motion_index
-
     def _more_observed(self, state: State) -> Observation:
         return {"furniture_pose": self._furniture.copy()}
-
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress = self._progress
-        verdict = progress.update(state)
-        if verdict.unwanted:
-            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or verdict.fallen == 1, progress.info()

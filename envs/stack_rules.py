@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..planner.jit import kernel
+from .progress import Progress
 from .scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, WORLD
 from .state import State
 from .things import TABLE_HEIGHT
@@ -24,7 +25,6 @@ STILL = 0.01
 """A block slower than this stands [m/s]."""
 WITHDRAWN = 0.05
 """Distance of the tcp to every block's center from which on the hand has withdrawn [m]."""
-SETTLED_SECONDS = 0.5
 LOST = 0.02
 """A block that was lifted and now stands farther than this from its place was dropped [m]."""
 LOWEST = TABLE_HEIGHT - 0.05
@@ -146,7 +146,7 @@ def shaped(poses, goals, tcp, placed, held):
     return (placed + part) / n
 
 
-class StackProgress:
+class StackProgress(Progress):
     """What has happened in an episode so far, renewed from the simulator's state at each step.
 
     Args:
@@ -156,19 +156,16 @@ class StackProgress:
     """
 
     def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float):
+        super().__init__(dt)
         self.n_blocks = len(goals)
         self._goals = goals
-        self._needed = round(SETTLED_SECONDS / dt)
-        self._settled_steps = 0
         self._memory = np.stack([start[:, 2], np.zeros(self.n_blocks)])
         self._errors = np.zeros((2, self.n_blocks))
         self._best_stage = 0
         self._stages = [stage_name(best, self.n_blocks) for best in range(2 * self.n_blocks + 1)]
         self.placed = 0
         self.held = False
-        self.collisions = 0
-        self.collision = ""
-        self.failure = ""
+        self._failure = ""
 
     @property
     def motion_index(self) -> float:
@@ -176,9 +173,19 @@ class StackProgress:
         return float(2 * self.placed + self.held)
 
     @property
-    def success(self) -> bool:
-        """All blocks have been in place, at rest and let go for long enough."""
-        return self._settled_steps >= self._needed
+    def failed(self) -> bool:
+        """A block is off the table."""
+        return self._failure == "off_table"
+
+    @property
+    def stage(self) -> str:
+        """The furthest progress in words."""
+        return self._stages[self._best_stage]
+
+    @property
+    def failure(self) -> str:
+        """Why it cannot succeed as things are, "" if it can."""
+        return self._failure
 
     def update(self, state: State) -> Verdict:
         """Take in a new state."""
@@ -186,30 +193,18 @@ class StackProgress:
         poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
         verdict = Verdict(*judged(poses, moving, tcp, state.touching, self._goals, self._memory, self._errors))
         self.placed, self.held = verdict.placed, verdict.held == 1
-        self._settled_steps = self._settled_steps + 1 if verdict.settled else 0
+        self._settle(verdict.settled == 1, verdict)
         self._best_stage = max(self._best_stage, 2 * verdict.placed + verdict.raised)
-        self.collisions += verdict.unwanted
-        self.failure = "off_table" if verdict.fallen else "dropped" if verdict.lost else ""
+        self._failure = "off_table" if verdict.fallen else "dropped" if verdict.lost else ""
         return verdict
 
     def reward(self, state: State) -> float:
         """The dense reward of the state taken in last."""
         return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
-    def info(self) -> dict[str, Any]:
-        """The entries of `info`."""
-        success = self.success
-        return {
-            "is_success": success,
-            "success": success,
-            "safe": self.collisions == 0,
-            "stage": self._stages[self._best_stage],
-            "failure_reason": self.failure,
-            "collision": self.collision,
-            "blocks_placed": self.placed,
-            "position_error": self._errors[0],
-            "yaw_error": self._errors[1],
-        }
+    def numbers(self) -> dict[str, Any]:
+        """The task's own entries of `info`."""
+        return {"blocks_placed": self.placed, "position_error": self._errors[0], "yaw_error": self._errors[1]}
 
 
 def stage_name(best: int, n_blocks: int) -> str:

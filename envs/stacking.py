@@ -6,21 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from ..planner.errors import BadOption, UnknownName
+from ..planner.errors import BadOption
 from ..planner.pose import Pose
 from ..planner.shapes import Box
-from .base import SLOTS, OneDemoEnv
+from .base import OneDemoEnv
 from .layouts import BASE_GAP, LONG_GAP, RANGES, TABLE_EDGE, Layout, stack_layout
-from .options import checked_joints, checked_poses
+from .options import check_known, checked_joints, checked_poses
 from .placement import Leg, Order
 from .render import Ghost
-from .robot_parts import robot_parts
 from .robots import robot_named
 from .sim import Start
-from .spaces import observation_space
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress
-from .state import State
-from .task import TaskDescription, TaskObject
 from .things import TABLE_HEIGHT, Solid, Things
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
@@ -35,7 +31,7 @@ DOWN = (0.0, 1.0, 0.0, 0.0)
 """A hand that points down, fingers closing along world x (wxyz)."""
 
 
-class StackEnv(OneDemoEnv):
+class StackEnv(OneDemoEnv[StackProgress]):
     """Stack wooden blocks at a given place, in order, with one arm.
 
     ## Description
@@ -127,8 +123,11 @@ class StackEnv(OneDemoEnv):
         kind.check_grip(BLOCK, robot, "a block")
         blocks = tuple(Solid(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
         super().__init__(
+            name="stack",
             robot=robot,
             things=Things(blocks),
+            goals=n_blocks,
+            motions=2 * n_blocks,
             level=level,
             obstacles=obstacles,
             control_mode=control_mode,
@@ -138,34 +137,11 @@ class StackEnv(OneDemoEnv):
             arms=kind.checked_arms(arm, robot),
         )
         self.n_blocks, self._reach = n_blocks, kind.reach
-        parts = robot_parts(robot, self.sim.scene)
-        widths = tuple(self.sim.widest_opening(k) for k in range(len(self.arms)))
-        self.observation_space = observation_space(self.arms, widths, n_blocks, n_blocks, 2 * n_blocks, SLOTS)
-        self._task = TaskDescription(
-            name="stack",
-            robot=robot,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(block) for block in blocks),
-            bodies=parts.bodies,
-            table_height=TABLE_HEIGHT,
-            fixtures=parts.fixtures,
-            gripper_width=widths,
-            obstacles=SLOTS,
-            touching=parts.touching,
-        )
         self._goal_pose = np.zeros((n_blocks, 7))
         self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
 
-    @property
-    def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
-        return self._task
-
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        for key in options:
-            if key not in OPTIONS:
-                raise UnknownName("reset option", key, OPTIONS)
+        check_known(options, OPTIONS)
         home = self.sim.scene.home
         axis = self.arms[0].chain[0, 4:6]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
@@ -206,17 +182,6 @@ class StackEnv(OneDemoEnv):
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BLOCK_SIZE)) for pose in self._goal_pose]
-
-    def _goals(self) -> tuple[np.ndarray, float]:
-        return self._goal_pose.copy(), self._progress.motion_index
-
-    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        progress = self._progress
-        verdict = progress.update(state)
-        if verdict.unwanted:
-            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or verdict.fallen == 1, progress.info()
 
 
 def _grasps(block: np.ndarray) -> list[Pose]:

@@ -83,6 +83,15 @@ def test_the_planner_pours_what_it_holds_from_the_start():
     env.close()
 
 
+@pytest.mark.parametrize(
+    "robot", ["Baxter", *(pytest.param(r, marks=pytest.mark.slow) for r in ("Sawyer", "IIWA", "UR5e", "Kinova3"))]
+)
+def test_other_robots_pour_from_the_same_demonstration(robot):
+    env = gym.make("onedemo/Pour-v0", robot=robot)
+    assert episode(env, "L2", 1).safe_success
+    env.close()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["L1", "L2", "L3", "L4"])
 def test_the_planner_pours_again_and_again(env, level):

@@ -52,6 +52,19 @@ def test_one_book_from_the_lower_shelfs_demonstration_into_the_upper_one():
     assert (record.success, record.safe, record.failure_reason) == (True, True, "")
 
 
+def test_a_book_that_hangs_in_the_hand_goes_in_along_a_level_way():
+    # in Baxter's fingers, at this start, it would hit the shelf's board
+    record = shelved(7, "L2", robot="Baxter", n_books=2)
+    assert (record.success, record.safe, record.failure_reason) == (True, True, "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["Baxter", "Sawyer", "IIWA", "UR5e"])
+def test_other_robots_shelve_from_the_same_demonstration(robot):
+    record = shelved(0, "L1", robot=robot)
+    assert (record.success, record.safe, record.failure_reason) == (True, True, "")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("level, seed", [("L1", 21), ("L2", 22)])
 def test_one_demonstration_shelves_three_books(level, seed):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import os
 import subprocess
 import sys
 import warnings
@@ -20,7 +21,7 @@ from onedemo.planner.errors import BadAction, OneDemoError, RenderingUnavailable
 
 ALL = sorted(onedemo.envs.IDS)
 CASES = [(name, {}) for name in ALL] + [
-    ("onedemo/Stack-v0", {"robot": "Baxter"}),
+    *[(f"onedemo/{task}-v0", {"robot": "Baxter"}) for task in ("Stack", "Pour", "Shelve")],
     ("onedemo/Stack-v0", {"level": "L4"}),
 ]
 LABELS = [" ".join([name.split("/")[1], *options.values()]) for name, options in CASES]
@@ -82,7 +83,7 @@ def test_another_process_gives_the_same_bits(env, tmp_path):
     )
     options = json.dumps(env.spec.kwargs)
     run = [sys.executable, "-c", code, __file__.rsplit("/", 1)[0], env.spec.id, options]
-    done = subprocess.run(run, capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": "5", "HOME": "/tmp"})
+    done = subprocess.run(run, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONHASHSEED": "5"})
     assert done.stdout.strip() == episode_hash(env, 7)
 
 

@@ -12,7 +12,8 @@ import pytest
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.beads import poured_into, settled_beads, settling
 from onedemo.envs.pour_geometry import BEADS, GLASSES, SOURCE, TARGET, TILTED, grasp, pouring, tcp_from_glass
-from onedemo.envs.pour_layouts import FARTHEST, GAP, NEAREST, PLACES, RANGES, pour_layout
+from onedemo.envs.pour_layouts import FARTHEST, GAP, NEAREST, RANGES, pour_layout
+from onedemo.envs.pour_places import POUR_PLACES, PourPlaces
 from onedemo.envs.pour_rules import PourProgress, allowed_contact, beads_inside
 from onedemo.envs.scene import (
     ARM,
@@ -230,8 +231,10 @@ def test_the_forward_pour_has_its_lip_at_the_pour_point():
 
 
 @pytest.mark.parametrize("name", sorted(RANGES))
-def test_layouts_keep_their_ranges_and_distances(name):
-    ranges, nominal, rng = RANGES[name], np.array(PLACES), np.random.default_rng(0)
+@pytest.mark.parametrize("robot", [robot for robot, places in POUR_PLACES.items() if isinstance(places, PourPlaces)])
+def test_layouts_keep_their_ranges_and_distances(name, robot):
+    places = POUR_PLACES[robot]
+    ranges, nominal, rng = RANGES[name], np.array(places.stands), np.random.default_rng(0)
     for _ in range(200):
         tops = pour_layout(rng, ranges, nominal, AXIS, GAP)
         shift = np.abs(tops - nominal)

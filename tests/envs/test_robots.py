@@ -6,13 +6,16 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
+from reach import PourReach, ShelfReach
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.bodies import robot_body
+from onedemo.envs.pour_places import POUR_PLACES
 from onedemo.envs.robot_parts import PARKED
-from onedemo.envs.robots import ROBOTS
+from onedemo.envs.robots import ROBOTS, places_of
 from onedemo.envs.rooms import arm_room
 from onedemo.envs.scene import ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, WORLD, compiled_scene
+from onedemo.envs.shelf_places import SHELF_PLACES
 from onedemo.envs.sim import Simulation, Start
 from onedemo.envs.stack_rules import allowed_contact
 from onedemo.envs.things import NOTHING
@@ -24,6 +27,9 @@ from onedemo.planner.shapes import pack
 
 ARMS = [(robot, side) for robot, kind in ROBOTS.items() for side in kind.ready]
 each_robot = pytest.mark.parametrize("robot", sorted(ROBOTS))
+PLACED = [("Pour", robot) for robot, places in POUR_PLACES.items() if not isinstance(places, str)]
+PLACED += [("Shelve", robot) for robot, places in SHELF_PLACES.items() if not isinstance(places, str)]
+each_placed = pytest.mark.parametrize("task, robot", PLACED, ids=["-".join(each) for each in PLACED])
 each_arm = pytest.mark.parametrize("robot, side", ARMS, ids=["-".join(each) for each in ARMS])
 
 
@@ -200,8 +206,52 @@ def test_what_cannot_be_is_refused_in_a_line():
         gym.make("onedemo/BimanualPour-v0", robot="Panda")
 
 
-@pytest.mark.parametrize("task", ["Pour", "Shelve"])
-@pytest.mark.parametrize("robot", ["Baxter", "UR5e"])
-def test_a_robot_that_a_task_is_not_made_for_is_refused_in_one_line(task, robot):
-    with pytest.raises(BadOption, match=f"'robot': {robot} cannot do {task}, whose places are made for: Panda"):
-        gym.make(f"onedemo/{task}-v0", robot=robot)
+def test_a_robot_without_places_is_refused_in_one_line_with_the_reason():
+    with pytest.raises(BadOption, match="'robot': UR5e cannot pour: its arm is too short") as caught:
+        places_of({"UR5e": "its arm is too short"}, "UR5e", "pour")
+    assert "\n" not in str(caught.value)
+    with pytest.raises(BadOption, match="'robot': Kinova3 cannot shelve: its wrist"):
+        gym.make("onedemo/Shelve-v0", robot="Kinova3")
+    with pytest.raises(BadOption, match="Sawyer cannot pour: no places were made for it"):
+        places_of({}, "Sawyer", "pour")
+    with pytest.raises(UnknownName, match="unknown robot 'R2D2'; known: Panda, Baxter"):
+        places_of({}, "R2D2", "pour")
+
+
+@each_robot
+def test_every_robot_has_places_or_a_reason(robot):
+    assert robot in POUR_PLACES and robot in SHELF_PLACES
+
+
+@each_placed
+def test_it_starts_clear_of_everything_and_moves_in_the_task(task, robot):
+    env = gym.make(f"onedemo/{task}-v0", robot=robot)
+    rng, inner = np.random.default_rng(0), env.unwrapped
+    fixtures = [f for f in inner.task.fixtures if not {("link1", f.name), ("link2", f.name)} & set(inner.task.touching)]
+    for level in ("L0", "L1", "L2"):
+        for seed in range(3):
+            observation, info = env.reset(seed=seed, options={"level": level})
+            assert env.observation_space.contains(observation)
+            assert info["safe"]
+            assert np.abs(inner.sim.data.contact.dist).max(initial=0.0) < 1e-3, "nothing is inside anything"
+            q = observation["joint_positions"][0]
+            assert arm_room(inner.arms[0], inner.task.bodies[0], q, pack(fixtures), range(2, len(q))) > 0.02
+    for _ in range(50):
+        observation, *_ = env.step(rng.uniform(-1, 1, env.action_space.shape))
+        assert env.observation_space.contains(observation)
+    env.close()
+
+
+@each_placed
+def test_most_starts_are_within_reach_of_the_demonstration(task, robot):
+    # the planner reaches more: it also goes round and through joint space
+    if task == "Pour":
+        reached, as_shown = PourReach(robot).share(POUR_PLACES[robot], "L1", 10)
+        assert reached >= 0.9 and as_shown >= 0.6
+    else:
+        assert ShelfReach(robot).share(SHELF_PLACES[robot], "L1", 16) > 0.5
+
+
+@each_robot
+def test_a_gripper_opens_as_far_as_its_facts_say(robot):
+    assert Simulation(robot, NOTHING).widest_opening(0) == pytest.approx(ROBOTS[robot].opening, abs=1e-6)

@@ -10,18 +10,20 @@ from hypothesis import strategies as st
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.scene import ARM, FINGERS, FIRST_OBJECT, FURNITURE, OBSTACLE, WORLD
-from onedemo.envs.shelf_layouts import CUPBOARD, CUPBOARD_YAW, RANGES, STAND, STAND_YAW, shelf_layout
-from onedemo.envs.shelf_parts import BOOK_SIZE, CLEAR, PITCH, SHELVES
+from onedemo.envs.shelf_layouts import RANGES, shelf_layout
+from onedemo.envs.shelf_parts import BOOK_SIZE, CLEAR, PITCH, SHELVES, handed
+from onedemo.envs.shelf_places import SHELF_PLACES, ShelfPlaces
 from onedemo.envs.shelve_rules import ShelveProgress, allowed_contact
-from onedemo.envs.shelving import GRASP, READY
+from onedemo.envs.shelving import GRASP
 from onedemo.planner.errors import BadOption, OneDemoError
 from onedemo.planner.ik import inverse_kinematics
 from onedemo.planner.pose import Pose
 
 IDLE = np.zeros(8)
 N, CLUTTER = 3, FIRST_OBJECT + 3
-STANDING = [*STAND, np.cos(STAND_YAW / 2), 0.0, 0.0, np.sin(STAND_YAW / 2)]
-FRONT = [*CUPBOARD, 0.8, np.cos(CUPBOARD_YAW / 2), 0.0, 0.0, np.sin(CUPBOARD_YAW / 2)]
+PANDAS = SHELF_PLACES["Panda"]
+STANDING = Pose.from_yaw(PANDAS.stand, PANDAS.stand_yaw).vector.tolist()
+FRONT = Pose.from_yaw([*PANDAS.cupboard, 0.8], PANDAS.cupboard_yaw).vector.tolist()
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +190,7 @@ def test_wanted_contacts():
 
 def test_the_next_book_is_handed_over_when_the_last_is_shelved_and_the_robot_is_away(env):
     near = env._drawn.handed(0) @ GRASP @ Pose.from_position_quaternion([0.0, 0.0, -0.09])
-    joints = inverse_kinematics(env.arms[0], near, READY["Panda"])
+    joints = inverse_kinematics(env.arms[0], near, PANDAS.ready)
     env.reset(seed=0, options={"joint_positions": joints})
     pile = env.step(IDLE)[0]["object_pose"][1]
     assert pile[2] < 0.9
@@ -222,16 +224,21 @@ def test_goals_are_upright_in_the_named_shelf_and_fit(shelf):
 
 
 @settings(max_examples=50, deadline=None)
-@given(st.integers(0, 2**31), st.sampled_from(sorted(RANGES)), st.integers(1, 3))
-def test_layouts_keep_their_ranges(seed, name, count):
+@given(
+    st.integers(0, 2**31),
+    st.sampled_from(sorted(RANGES)),
+    st.integers(1, 3),
+    st.sampled_from([places for places in SHELF_PLACES.values() if isinstance(places, ShelfPlaces)]),
+)
+def test_layouts_keep_their_ranges(seed, name, count, places):
     ranges = RANGES[name]
-    layout = shelf_layout(np.random.default_rng(seed), ranges, count, (1, 7))
-    off = layout.stand.position - STAND
+    layout = shelf_layout(np.random.default_rng(seed), ranges, places, count, (1, 7))
+    off = layout.stand.position - places.stand
     assert np.abs(off[:2]).max() <= ranges.stand + 1e-12
     assert -ranges.lower - 1e-12 <= off[2] <= ranges.higher + 1e-12
-    assert abs(layout.stand.yaw - STAND_YAW) <= ranges.stand_yaw + 1e-12
-    assert np.abs(layout.cupboard.position[:2] - CUPBOARD).max() <= ranges.cupboard + 1e-12
-    assert abs(layout.cupboard.yaw - CUPBOARD_YAW) <= ranges.cupboard_yaw + 1e-12
+    assert abs(layout.stand.yaw - places.stand_yaw) <= ranges.stand_yaw + 1e-12
+    assert np.abs(layout.cupboard.position[:2] - places.cupboard).max() <= ranges.cupboard + 1e-12
+    assert abs(layout.cupboard.yaw - places.cupboard_yaw) <= ranges.cupboard_yaw + 1e-12
     assert abs(layout.slots) <= ranges.slots
     assert np.abs(layout.joints).max() <= ranges.joints
     assert len(layout.goals("upper")) == count and len(layout.objects()) == count + 5
@@ -253,6 +260,8 @@ def test_layouts_keep_their_ranges(seed, name, count):
         ({"cupboard_pose": [*FRONT[:3], 1.0, 0.0, 0.0, 0.0]}, "yaw of 0 degrees cannot be reached; allowed: 75 by 20"),
         ({"slots": 0.2}, "leave -0.[0-9]+ m beside the slots of the lower shelf; 0.03 m are needed"),
         ({"slots": "left"}, "'slots': is not an array of numbers"),
+        ({"books": np.zeros((2, 3))}, r"'books': has shape \(2, 3\); expected \(3, 3\)"),
+        ({"books": [[0, 0, 0], [0, 0.05, 0], [0, 0, 0]]}, r"book 1 at \[0.0, 0.05, 0.0\] would not lie on the stand"),
         ({"clutter": np.full((5, 2), 0.1)}, "with the clutter on the left leave"),
         ({"clutter": np.full((5, 2), -0.1)}, "gap -0.1 m is negative"),
         ({"joint_positions": np.zeros(6)}, "joint_positions"),
@@ -263,6 +272,19 @@ def test_bad_reset_options_are_named(env, options, message):
     with pytest.raises(OneDemoError, match=message) as caught:
         env.reset(options=options)
     assert "\n" not in str(caught.value)
+
+
+def test_given_books_lie_where_they_are_wanted_and_stay_there(env):
+    wanted = [[0.015, -0.03, 0.3], [-0.015, 0.03, -0.3], [0.0, 0.0, 0.0]]
+    observation, _ = env.reset(seed=0, options={"books": wanted})
+    stand, first = (Pose.from_vector(observation[key][k]) for key, k in (("furniture_pose", 1), ("object_pose", 0)))
+    off = (stand.inverse() @ first).position - handed(np.zeros(3)).position
+    np.testing.assert_allclose(off, [0.015, -0.03, 0.0], atol=1e-9)
+    for k in range(3):
+        put(env, {0: env._drawn.handed(k).vector})
+        for _ in range(50):
+            after, *_ = env.step(IDLE)
+        assert np.abs(after["object_pose"][0, :3] - env._drawn.handed(k).position).max() < 2e-3
 
 
 @pytest.mark.parametrize("n_books", [0, 4, 2.0, True, "3"])
