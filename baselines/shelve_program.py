@@ -120,7 +120,7 @@ class ShelveProgram:
             # the book slips a little while it is lifted: the goal is computed from how it is held now
             held = self._held(k)
             insertion = self._insertion(k, held)
-            into = self._leg("insert", k, insertion[-1], touching, held)._replace(strictly=True)
+            into = self._leg("insert", k, insertion[-1], touching, held)._replace(demonstrated=insertion, strictly=True)
             leg, choice = self._chosen_carry(k, insertion[0], held, into)
             yield from self._done(choice, leg)
             self.hand.surroundings.keep(OBJECT_MARGIN)
