@@ -7,7 +7,7 @@ much of the method the guard alone is.
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from .dmp import Dmp, DmpSettings
 from .made_follower import MadeFollower
 from .made_planner import MadePlanner
 from .makers import Decoupled, Maker, Replay
-from .mover import LegPlanner, Mover, Relative
+from .mover import LegPlanner, Mover, Relative, ScrewMover
 from .near_tool import NearTool
 from .potential import FieldSettings, Potential
 from .program_settings import ProgramSettings
@@ -57,6 +57,14 @@ class MadeMover:
         """Along their paths."""
 
 
+class DecoupledMover(ScrewMover):
+    """The method's mover; what one hand does seen from another is interpolated apart, too."""
+
+    def relative(self, shown: PosePath, start: Pose) -> Relative:
+        """See `Mover`."""
+        return MadeMover(Decoupled()).relative(shown, start)
+
+
 @dataclass(frozen=True, slots=True)
 class MadeSettings(ProgramSettings):
     """Of a policy that moves along the paths of a maker."""
@@ -81,12 +89,27 @@ class MadeSettings(ProgramSettings):
 
 @dataclass(frozen=True, slots=True)
 class DecoupledSettings(MadeSettings):
-    """Of `decoupled`: TSIA, position and orientation interpolated apart."""
+    """Of `decoupled`: the method without escape trees, search and guard, position and orientation apart.
+
+    The blend is the controller's pull, as the method's is, not a path that is followed: a path would be left less
+    freely, and the comparison would not be of the screw alone.
+    """
 
     @property
     def maker(self) -> Maker:
         """See `MadeSettings`."""
         return Decoupled()
+
+    @property
+    def mover(self) -> Mover:
+        """See `ProgramSettings`."""
+        return DecoupledMover()
+
+    @property
+    def plan(self) -> PlanSettings:
+        """See `ProgramSettings`."""
+        motion = replace(self.motion, pursuit=replace(self.motion.pursuit, pull="apart"))
+        return PlanSettings(motion=motion, safety=self.safety, search=None, avoid=False, guard=self.guard)
 
 
 @dataclass(frozen=True, slots=True)

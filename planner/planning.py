@@ -190,7 +190,8 @@ class Planner:
             return "start beyond a joint limit", f"{self.arm.joint_names[joint]} by {-margins[joint]:.3f} rad"
         if self.settings.guard and scene.room(q) < 0.0:
             return "start in collision", str(scene.tightest(q))
-        if scene.tool_room(goal) < 0.0:
+        # what neither plans round anything nor is guarded does not look
+        if (self.settings.guard or self.settings.avoid) and scene.tool_room(goal) < 0.0:
             return "goal in collision", str(scene.tightest_of_tool(goal))
         return "", ""
 

@@ -41,6 +41,8 @@ class PursuitSettings:
         angle_tolerance: arrival [rad].
         patience: seconds without progress after which it has stalled.
         rule: "capture" as above, or "paper": the reference advances every tick.
+        pull: "screw": along one screw to the reference; "apart": position straight, orientation by slerp, as where
+            the two are interpolated apart. Not in the paper: what the screw is compared with.
     """
 
     tau: float = 1.0
@@ -49,12 +51,15 @@ class PursuitSettings:
     angle_tolerance: float = 0.01
     patience: float = 3.0
     rule: str = "capture"
+    pull: str = "screw"
 
     def __post_init__(self):
         if not 0 < self.tau <= 1:
             raise BadOption("tau", f"{self.tau} is not in (0, 1]")
         if self.rule not in ("capture", "paper"):
             raise BadOption("rule", f"{self.rule!r} is not one of capture, paper")
+        if self.pull not in ("screw", "apart"):
+            raise BadOption("pull", f"{self.pull!r} is not one of screw, apart")
         for name in ("capture_radius", "position_tolerance", "angle_tolerance", "patience"):
             if not 0 < getattr(self, name) < math.inf:
                 raise BadOption(name, f"{getattr(self, name)} is not a positive number")
@@ -62,7 +67,8 @@ class PursuitSettings:
     def packed(self) -> tuple[float, ...]:
         """The settings as the kernels take them."""
         tolerances = (self.position_tolerance, self.angle_tolerance)
-        return (self.tau, self.capture_radius, *tolerances, self.patience, float(self.rule == "paper"))
+        choices = float(self.rule == "paper"), float(self.pull == "apart")
+        return (self.tau, self.capture_radius, *tolerances, self.patience, *choices)
 
 
 class RollOut(NamedTuple):
@@ -120,6 +126,9 @@ def pursue(work, path, q, dt, memory, qdot):
     memory[SIGN] = choose_sign(error, memory[SIGN])
     if memory[SIGN] < 0.0:
         error = screw.neg(error)
+    if work[PURSUIT, 6] == 1.0:
+        p, turn = screw.translation(error), screw.twist_along(error)
+        error = screw.from_twist((p[0], p[1], p[2], turn[3], turn[4], turn[5]))
     if tau < 1.0:
         error = screw.from_twist(screw.scaled(screw.twist_along(error), tau))
     joint_velocity(work, q, error, qdot)

@@ -240,12 +240,14 @@ def test_a_guard_is_off_unless_it_is_asked_for(name):
     free = leg(name)
     ball = Obstacle(Sphere(0.05), at(arm.fk(free.joints[len(free.joints) // 2]).position), name="ball")
     blind = leg(name, [ball])
-    assert blind.success and blind.changed == 0 and smallest_room(blind, ball) < 0.0 and blind.kept < 1.0
+    assert blind.success and blind.changed == 0 and smallest_room(blind, ball) < 0.0
+    if name == "replay":
+        assert blind.kept < 1.0
     guarded = leg(name, [ball], {"guard": True})
     if guarded.success:
         assert smallest_room(guarded, ball) > 0.0
     else:
-        assert guarded.reason == "ik_or_limit"
+        assert guarded.reason in ("ik_or_limit", "goal in collision")
 
 
 @pytest.mark.parametrize(

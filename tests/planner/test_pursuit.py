@@ -159,6 +159,24 @@ def test_out_of_reach_is_a_stall_and_too_long_is_a_timeout():
     assert status == STALLED
 
 
+@pytest.mark.parametrize("pull", ["screw", "apart"])
+def test_pulled_apart_the_tool_goes_straight_and_along_the_screw_otherwise(pull):
+    arm = panda()
+    start = arm.fk(READY)
+    goal = start @ Pose.from_position_quaternion([0.06, 0.05, -0.05], [np.cos(0.4), 0.0, np.sin(0.4), 0.0])
+    gentle = ControllerSettings(null_gain=0.0, max_linear=1e3, max_angular=1e3, gain=1.0)
+    pursuit = Pursuit(arm, PosePath(goal.dq[None]), DT, controller=gentle, settings=PursuitSettings(pull=pull))
+    result = pursuit.roll_out(READY)
+    assert result.arrived
+    way = np.array([arm.fk(q).position for q in result.trace])
+    along = (goal.position - start.position) / np.linalg.norm(goal.position - start.position)
+    off_line = np.linalg.norm(np.cross(way - start.position, along), axis=1).max()
+    curve = screw_path(start, goal, 0.0005).positions
+    off_screw = max(np.linalg.norm(curve - each, axis=1).min() for each in way)
+    assert (off_line < 1e-3) == (pull == "apart")
+    assert (off_screw < 1e-3) == (pull == "screw")
+
+
 def test_the_papers_rule_advances_every_tick_and_is_late():
     arm, path = a_path(7, step=0.001)
     settings_ = PursuitSettings(rule="paper", tau=0.01)
@@ -170,7 +188,9 @@ def test_the_papers_rule_advances_every_tick_and_is_late():
     assert arm.fk(q).gap(path[-1])[0] > 0.5 * path.lengths()[-1] * 0.2
 
 
-@pytest.mark.parametrize("change", [{"tau": 0.0}, {"tau": 1.1}, {"rule": "fast"}, {"capture_radius": -1.0}])
+@pytest.mark.parametrize(
+    "change", [{"tau": 0.0}, {"tau": 1.1}, {"rule": "fast"}, {"pull": "hard"}, {"capture_radius": -1.0}]
+)
 def test_bad_settings_are_named(change):
     with pytest.raises(BadOption, match=next(iter(change))):
         PursuitSettings(**change)
