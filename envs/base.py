@@ -189,12 +189,13 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         if kind == "none":
             return ()
         task, legs = self.task, self._legs(start)
-        solids = [*task.fixtures]
+        things = []
         for each, pose in zip(task.objects, start.objects, strict=True):
-            solids.append(Solid(each.shape, Pose.from_vector(pose), name=each.name))
+            things.append(Solid(each.shape, Pose.from_vector(pose), name=each.name))
         for each, pose in zip(task.furniture, start.furniture, strict=True):
-            solids += each.at(Pose.from_vector(pose))
-        stage = Stage(legs, task.arms[0], task.bodies[0], start.joints[0], solids, task.table_height)
+            things += each.at(Pose.from_vector(pose))
+        solids = [*task.fixtures, *things]
+        stage = Stage(legs, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height)
         return placed(self.np_random, kind, stage, self._paper(legs) if kind == "paper" else None)
 
     def _reached(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

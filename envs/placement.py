@@ -98,13 +98,23 @@ class Stage:
         body: of it, with an empty hand.
         joints: (dof,) at the start.
         solids: what else stands there.
+        things: those of them that are no part of the robot's place.
         floor: z of the table top [m].
     """
 
-    def __init__(self, legs: list[Leg], arm: Arm, body: Body, joints: np.ndarray, solids: list[Obstacle], floor: float):
+    def __init__(
+        self,
+        legs: list[Leg],
+        arm: Arm,
+        body: Body,
+        joints: np.ndarray,
+        solids: list[Obstacle],
+        things: list[Obstacle],
+        floor: float,
+    ):
         self.legs, self.arm, self.body, self.joints, self.floor = legs, arm, body, joints, floor
         self.tools = [body.holding("held", leg.shape, leg.tcp_from_object, arm).tool(arm) for leg in legs]
-        self._solids = pack(solids)
+        self._solids, self._things = pack(solids), pack(things)
         self._keys = [key for leg in legs for key in _alternatives(leg)]
         self._key_poses = [np.array([pose.dq for key in leg.keys for pose in key]) for leg in legs]
         self._postures: dict[int, list[list[np.ndarray]]] = {}
@@ -152,11 +162,14 @@ class Stage:
         return self._postures[index]
 
     def _along(self, line: tuple[Pose, ...], seed: np.ndarray) -> list[np.ndarray]:
-        """Postures at the poses of a line, each near the one before; none where there is none."""
+        """Postures at the poses of a line, each near the one before, off what stands there; none if there is none."""
         found: list[np.ndarray] = []
         for pose in line:
             q = inverse_kinematics(self.arm, pose, found[-1] if found else seed)
             if q is None or (found and np.abs(q - found[-1]).max() > NEAR):
+                return []
+            # what moves with the last joint may be near what it takes and where it puts it
+            if arm_room(self.arm, self.body, q, self._things, range(0, self.arm.dof - 1)) < 0.0:
                 return []
             found.append(q)
         return found

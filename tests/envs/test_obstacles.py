@@ -192,18 +192,16 @@ def test_what_is_not_there_is_zeros_and_what_is_there_is_told_in_full(env):
         np.testing.assert_allclose(env.sim.data.mocap_pos[mocap], swing.position(time), atol=1e-12)
 
 
-def test_one_that_appears_waits_for_its_motion_its_delay_and_for_room(env):
+def test_one_that_appears_waits_for_its_motion_its_delay_and_for_room(env, monkeypatch):
     observation, _ = started(env)
     tcp = tuple(observation["tcp_pose"][0, :3])
     later = Intruder(Sphere(0.04), (0.1, 0.3, 1.3), motion=1, delay=0.5)
     never = Intruder(Sphere(0.04), (0.1, -0.3, 1.3), motion=3)
     blocked = Intruder(Sphere(0.04), tcp, motion=1)
     started(env, later, never, blocked)
-    env._goals = lambda: (env._goal_pose.copy(), 1.0 if env._steps >= 10 else 0.0)
-    try:
-        shown = [env.step(IDLE)[0]["obstacle_active"].tolist() for _ in range(60)]
-    finally:
-        del env._goals
+    index = property(lambda _: 1.0 if env._steps >= 10 else 0.0)
+    monkeypatch.setattr(type(env._progress), "motion_index", index)
+    shown = [env.step(IDLE)[0]["obstacle_active"].tolist() for _ in range(60)]
     assert shown.index([1, 0, 0]) == pytest.approx(10 + 0.5 / env.control_dt, abs=2)
     assert shown[-1] == [1, 0, 0]
 
@@ -258,13 +256,13 @@ def test_obstacles_that_cannot_be_are_refused_in_one_line(env, options, message)
     assert "\n" not in str(caught.value)
 
 
-def test_nothing_appears_nearer_than_promised():
+def test_nothing_appears_nearer_than_promised(monkeypatch):
     env = gym.make("onedemo/Stack-v0").unwrapped
     observation, _ = started(env)
     x, y, z = observation["tcp_pose"][0, :3]
     for offset, room in ((ROOM + 0.02, True), (ROOM - 0.03, False)):
         started(env, Intruder(Sphere(0.02), (x, y, z - 0.02 - offset), motion=1))
-        env._goals = lambda: (env._goal_pose.copy(), 1.0)
+        monkeypatch.setattr(type(env._progress), "motion_index", property(lambda _: 1.0))
         env.step(IDLE)
         assert env.sim.obstacles.active[0] == room
     env.close()
@@ -277,7 +275,7 @@ def a_stage(straight=1):
     tcp = arm.fk(joints)
     keys = [Pose.from_position_quaternion([0.05 * k, 0.0, 0.0]) @ tcp for k in range(3)]
     leg = Leg(tcp, keys[-1], tuple((key,) for key in keys), Sphere(0.01), Pose.identity(), 0, straight=straight)
-    return Stage([leg], arm, body, joints, [], 0.0), keys
+    return Stage([leg], arm, body, joints, [], [], 0.0), keys
 
 
 def test_obstacles_that_each_leave_a_posture_but_together_none_are_seen():
