@@ -11,15 +11,16 @@ import numpy as np
 
 from ..planner.arm import Arm
 from ..planner.body import Body
-from ..planner.command import DONE, FAILED, ReactiveSettings
+from ..planner.command import DONE, ESCAPING, FAILED, Command, ReactiveSettings
 from ..planner.errors import PlanFailed
 from ..planner.plans import Onward, Plan
 from ..planner.pose import Pose, PosePath
 from ..planner.shapes import Shape
+from ..planner.tsia import final_path
 from .choice import Choice, Leg, choose, way_out
 from .made_follower import MadeFollower
-from .mover import MADE, SCREW, Mover
-from .policy import Observation
+from .mover import ESCAPE, MADE, SCREW, Mover
+from .policy import LabeledPath, Observation
 from .surroundings import Surroundings
 
 OPEN, CLOSE = -1.0, 1.0
@@ -53,6 +54,8 @@ class Hand:
         q: (dof,) commanded joints.
         empty: the body with nothing in the hand.
         observation: the latest; the policy renews it before each tick.
+        drawn: for drawing, each finished way round something that was not shown, as commanded; and the final paths that
+            plans would have followed without it.
     """
 
     def __init__(
@@ -71,6 +74,8 @@ class Hand:
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
         self._held: _Held | None = None
+        self.drawn: list[LabeledPath] = []
+        self._escape: list[np.ndarray] = []
         self.mover, self._planner = mover, mover.follower(arm, body, settings)
 
     @property
@@ -156,10 +161,15 @@ class Hand:
             self._planner.follow(plan, loosely=loosely)
         else:
             self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)
+        led = plan if plan is not None and plan.how == ESCAPE else None
+        if led:
+            nominal = final_path(self.arm.fk(self.q), led.imitated, led.guide)
+            self.drawn.append(LabeledPath("final", "", nominal))
         for tick in count():
             if tick % GLANCE == 0:
                 self._mind_held()
             command = self._planned()
+            self._note_escape(command, led is not None)
             if command.state == DONE:
                 return
             if command.state == FAILED:
@@ -177,6 +187,13 @@ class Hand:
         yield from self.follow(path[: free + 1], loosely=True, strictly=True)
         if free < len(path) - 1:
             yield from self.follow(path[free:], loosely=True)
+
+    def _note_escape(self, command: Command, led: bool) -> None:
+        if command.state == ESCAPING or (led and command.state not in (DONE, FAILED)):
+            self._escape.append(self.arm.fk(self.q).dq)
+        elif self._escape:
+            self.drawn.append(LabeledPath("escape", "", PosePath(np.array(self._escape))))
+            self._escape = []
 
     def _mind_held(self) -> None:
         """Guard what is in the hand where it has slipped to."""
@@ -206,7 +223,7 @@ class Hand:
         self._planner.stop()
         return self._action(self._planned().velocity)
 
-    def _planned(self):
+    def _planned(self) -> Command:
         self._planner.see(self.surroundings.seen(self.observation), self.surroundings.allowed)
         return self._planner.step(self.q)
 

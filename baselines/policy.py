@@ -19,8 +19,8 @@ class LabeledPath:
     """A path that a policy used, for drawing.
 
     Attributes:
-        label: "demonstrated", "imitated" or "final".
-        motion: name of the motion it belongs to.
+        label: "demonstrated", "imitated", "final", or "escape": the way that was taken round what nobody showed.
+        motion: name of the motion it belongs to; "" where that is not known.
         poses: the tcp in the world.
     """
 

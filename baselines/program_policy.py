@@ -76,4 +76,5 @@ class ProgramPolicy(EpisodePolicy):
 
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
         """What happened in the episode of one environment of the state."""
-        return replace(state[index].ended, paths=tuple(state[index].program.paths))
+        episode = state[index]
+        return replace(episode.ended, paths=(*episode.program.paths, *episode.hand.drawn))

@@ -23,7 +23,7 @@ from ..planner.pose import METERS_PER_RADIAN, Pose, PosePath
 from ..planner.robot_work import PREVIOUS
 from ..planner.safety import BLOCKED, SafetyLayer
 from .mover import Mover
-from .policy import Observation
+from .policy import LabeledPath, Observation
 from .program_settings import ProgramSettings
 from .surroundings import TABLE, TABLE_MARGIN, intruders_of
 
@@ -55,7 +55,10 @@ class TwoHands:
     Attributes:
         q: (2, dof) commanded joints.
         observation: the latest; the policy renews it before each tick.
+        drawn: none, see `Hand`.
     """
+
+    drawn: tuple[LabeledPath, ...] = ()
 
     def __init__(self, task: TaskDescription, settings: ProgramSettings, observation: Observation, mover: Mover):
         self.task, self.settings, self._safety, self.mover = task, settings.motion, settings.safety, mover

@@ -83,6 +83,31 @@ def plan(
 
 
 @app.command()
+def reproduce(
+    names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Experiments; without a name all.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The folder.")] = Path("reproduction"),
+    episodes: Annotated[
+        int | None, typer.Option("--episodes", min=1, max=1000, help="Seeds of each; 10 if not given.")
+    ] = None,
+    video: Annotated[bool, typer.Option("--video/--no-video", help="A video of the first seed of each.")] = True,
+) -> None:
+    """Do the paper's experiments one by one, and write a page with results, figures and times.
+
+    Known: pour, pour_obstacles, stack, shelve, shelve_one, shelve_two, bimanual (an experiment each, some minutes in
+    all), tree (escape trees with all their planes, and their times). What is finished is not run again. The last line
+    on standard output is the page.
+
+    Examples:
+    - onedemo reproduce
+
+    - onedemo reproduce stack tree --no-video
+    """
+    from .reproduce import reproduce
+
+    raise typer.Exit(reproduce(names or [], output, episodes=episodes, video=video))
+
+
+@app.command()
 def perf(
     json: Annotated[Path | None, typer.Option("--json", help="Also write the rows to this file.")] = None,
     only: Annotated[str, typer.Option("--only", help="Part of a line's name, or a shell pattern.")] = "*",

@@ -70,8 +70,10 @@ class Content(NamedTuple):
     table: np.ndarray | None
 
 
-def draw_plan(planned: Planned, certificate: Certificate | None, files: Sequence[Path]) -> View:
-    """Draw a plan into every file; returns the view that was chosen."""
+def draw_plan(
+    planned: Planned, certificate: Certificate | None, files: Sequence[Path], *, every_plane: bool = False
+) -> View:
+    """Draw a plan into every file, with the planes of the branch taken or every one; returns the view chosen."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -90,7 +92,7 @@ def draw_plan(planned: Planned, certificate: Certificate | None, files: Sequence
         low, high = _stretched(low, high, 0.98 * WIDTH / height)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.axis("off")
-        _paint(axes, planned, content, view)
+        _paint(axes, planned, content, view, every_plane)
         _legend(figure, planned, content)
         figure.text(
             0.5,
@@ -189,7 +191,7 @@ def _stretched(low: np.ndarray, high: np.ndarray, ratio: float) -> tuple[np.ndar
     return middle - 0.5 * wanted, middle + 0.5 * wanted
 
 
-def _paint(axes: Any, planned: Planned, content: Content, view: View) -> None:
+def _paint(axes: Any, planned: Planned, content: Content, view: View, every_plane: bool) -> None:
     paint_floor(axes, view, *room_of(content))
     for posture, arm in enumerate(content.arms):
         paint_arm(axes, view, arm, posture)
@@ -199,7 +201,7 @@ def _paint(axes: Any, planned: Planned, content: Content, view: View) -> None:
         paint_solid(axes, view, content.solids[index], 10.0 + 0.01 * place)
     tree = planned.plan.tree
     if tree is not None:
-        paint_tree(axes, view, tree, planned.plan.path, content.solids)
+        paint_tree(axes, view, tree, planned.plan.path, content.solids, every=every_plane)
     for points in (content.final, content.executed):
         if len(points):
             below = np.column_stack([points[:, :2], np.full(len(points), content.floor)])

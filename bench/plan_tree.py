@@ -21,8 +21,10 @@ DIM = 0.34
 """Opacity behind a solid."""
 
 
-def paint_tree(axes: Any, view: View, tree: EscapeTree, path: PosePath, solids: Sequence[Solid]) -> None:
-    """Edges, kept and rejected, and the planes along the branch that came home."""
+def paint_tree(
+    axes: Any, view: View, tree: EscapeTree, path: PosePath, solids: Sequence[Solid], *, every: bool = False
+) -> None:
+    """Edges, kept and rejected, and the planes along the branch that came home, or every plane."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     positions = PosePath(tree.poses).positions
@@ -39,8 +41,7 @@ def paint_tree(axes: Any, view: View, tree: EscapeTree, path: PosePath, solids: 
         lines.set_zorder(24)
         axes.add_collection(lines)
     squares = []
-    for k in branch_planes(tree, path):
-        plane = tree.planes[k]
+    for plane in tree.planes if every else [tree.planes[k] for k in branch_planes(tree, path)]:
         side = 0.5 * PLANE_SIDE
         squares.append(
             [plane.origin + side * (a * plane.u + b * plane.v) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]

@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..baselines.policy import LabeledPath, Policy
+from ..baselines.surroundings import intruders_of
 from ..configs.schema import RunConfig
 from ..envs.task import TaskObject
 from ..planner.errors import RenderingUnavailable
+from ..planner.pose import Pose
+from ..planner.shapes import Obstacle
 from .episode import run_episode
 from .scenarios import Scenario
 
@@ -33,6 +36,9 @@ class Showcase:
         end: (n, 7) object poses at the end.
         executed: (steps + 1, 3) the tcp [m].
         paths: what the policy planned.
+        furniture: what stands there.
+        obstacles: by name, the last that was seen of each.
+        traces: by name, (n, 3) where it was [m].
         speed: how much faster than reality the video plays.
         video_problem: "" or why there is no video.
     """
@@ -44,6 +50,9 @@ class Showcase:
     end: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
     executed: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     paths: tuple[LabeledPath, ...] = ()
+    furniture: tuple[Obstacle, ...] = ()
+    obstacles: dict[str, Obstacle] = field(default_factory=dict)
+    traces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     speed: float = 1.0
     video_problem: str = ""
 
@@ -58,8 +67,13 @@ def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video
     def observer(env: Any, observation: dict[str, np.ndarray]) -> None:
         if not tcp:
             seen.start, seen.goals = observation["object_pose"], observation["goal_pose"]
+            for each, pose in zip(task.furniture, observation.get("furniture_pose", ()), strict=True):
+                seen.furniture += each.at(Pose.from_vector(pose))
         tcp.append(observation["tcp_pose"][0, :3])
         seen.end = observation["object_pose"]
+        for obstacle in intruders_of(observation):
+            seen.obstacles[obstacle.name] = obstacle
+            seen.traces.setdefault(obstacle.name, []).append(obstacle.pose.position)
         if film and len(tcp) % EVERY == 1:
             film.take(env)
 
