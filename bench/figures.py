@@ -16,6 +16,8 @@ from .surfaces import surface
 DEMONSTRATED, FINAL, FREE, EXECUTED = "#1f4fd8", "#d81fb4", "#00a9c7", "#6b6b6b"
 START_FACE, GOAL_FACE, TABLE_FACE = "#c8955a", "#8fb4f0", "#f1ede4"
 OBSTACLE_FACE, FURNITURE_FACE = "#d9482b", "#a9a090"
+TALL = 0.8
+"""Height of what is drawn, as a share of its width, from which it is drawn smaller: else labels leave the figure."""
 MOVED = 0.005
 """Length of an obstacle's trace [m] from which it is drawn."""
 
@@ -38,16 +40,21 @@ def draw_episode(seen: Showcase, title: str, files: Sequence[Path]) -> None:
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=(11.0, 6.0), layout="constrained")
-    grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1.0))
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1.0), wspace=0.08)
     space = figure.add_subplot(grid[0], projection="3d")
     _draw_in_space(space, seen)
     _draw_from_above(figure.add_subplot(grid[1]), seen)
     handles, labels = space.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5), frameon=False, fontsize=9)
+    figure.legend(handles, labels, loc="outside lower center", ncols=_columns(len(labels)), frameon=False, fontsize=9)
     figure.suptitle(title, fontsize=11)
     for file in files:
         figure.savefig(file, dpi=160)
     plt.close(figure)
+
+
+def _columns(entries: int) -> int:
+    """Of a legend with so many entries: in one line if they fit, else in two as equal as can be."""
+    return entries if entries <= 6 else (entries + 1) // 2
 
 
 def _lines(seen: Showcase) -> list[tuple[np.ndarray, str, dict[str, Any]]]:
@@ -104,7 +111,8 @@ def _draw_in_space(axes: Any, seen: Showcase) -> None:
         style = {"facecolor": group.face, "alpha": group.alpha, "zorder": 2, **edge}
         axes.add_collection3d(Poly3DCollection(polygons, label=group.label, **style))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.12)
+    size = high - low
+    axes.set_box_aspect(size, zoom=1.12 if size[2] < TALL * size[:2].max() else 0.98)
     axes.view_init(elev=22, azim=-55)
     for axis, label in ((axes.xaxis, "x [m]"), (axes.yaxis, "y [m]"), (axes.zaxis, "z [m]")):
         axis.pane.set_facecolor("white")
@@ -137,8 +145,10 @@ def _draw_from_above(axes: Any, seen: Showcase) -> None:
 def _bounds(seen: Showcase) -> tuple[np.ndarray, np.ndarray]:
     """Corners (3,) of what is drawn, down to the table [m]."""
     paths = [path.poses.positions for path in seen.paths]
-    bodies = [each.pose.position[None] for each in (*seen.furniture, *seen.obstacles.values())]
-    points = np.vstack([seen.executed, seen.start[:, :3], seen.goals[:, :3], *paths, *bodies])
-    low, high = points.min(axis=0) - 0.05, points.max(axis=0) + 0.05
+    traces = [np.array(trace) for trace in seen.traces.values()]
+    points = np.vstack([seen.executed, seen.start[:, :3], seen.goals[:, :3], *paths, *traces])
+    corners = np.vstack([polygon for group in _groups(seen) for solid in group.solids for polygon in solid])
+    low = np.minimum(points.min(axis=0) - 0.05, corners.min(axis=0) - 0.02)
+    high = np.maximum(points.max(axis=0) + 0.05, corners.max(axis=0) + 0.02)
     low[2] = seen.table_height
     return low, high

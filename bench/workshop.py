@@ -230,7 +230,8 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
         seen = watch(env, policy, scenarios_of(config)[0], config, video if config.video else None)
     finally:
         env.close()
-    where = ", ".join([config.task, config.robot, config.level, *([config.obstacles] if config.obstacles else [])])
+    among = "" if config.obstacles in (None, "none") else f", obstacles {config.obstacles}"
+    where = f"{config.task}, {config.robot}, {config.level}{among}"
     title = f"{where}, seed {config.seed}: one demonstration, {config.method}"
     draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
     return {"speed": seen.speed, "video": config.video, "video_problem": seen.video_problem}
