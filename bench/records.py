@@ -30,6 +30,7 @@ class EpisodeRecord:
     """One finished episode.
 
     Attributes:
+        cell: digest of the config of its cell, 12 hexadecimal digits.
         index: of the scenario.
         seed: of the scenario.
         method: the policy.
@@ -47,10 +48,13 @@ class EpisodeRecord:
         clearance: smallest distance of the robot, or of what it held, to an obstacle [m]; None: there was none.
         refused: starts that were drawn and had no room for the obstacles.
         numbers: the task's own, as in `info`, each a list.
+        metrics: see `metric_table`; None where there was nothing to measure.
         wall_seconds: real time; not part of the result.
-        tick_us: median, 99th percentile and largest time of the policy per tick [us]; not part of the result.
+        tick_us: median, 99th percentile and largest time of the policy per tick, and its time until the first action
+            that moves something [us]; not part of the result.
     """
 
+    cell: str
     index: int
     seed: int
     method: str
@@ -68,6 +72,7 @@ class EpisodeRecord:
     clearance: float | None
     refused: int
     numbers: dict[str, list[float]]
+    metrics: dict[str, float | None]
     wall_seconds: float
     tick_us: list[float]
 

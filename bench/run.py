@@ -237,8 +237,8 @@ def _report(
     env: Any, policy: Policy, config: RunConfig, folder: Path, records: list[EpisodeRecord], command: str, err: Any
 ) -> list[str]:
     """Figure, video, report and summary; the lines for the terminal."""
+    from .cell_report import report_text, summary_row, verdict, write_summary
     from .figures import draw_episode
-    from .report import report_text, summary_row, verdict, write_summary
     from .showcase import watch
 
     figure, video = folder / "episode0.png", folder / "episode0.mp4"

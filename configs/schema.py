@@ -29,7 +29,8 @@ class RunConfig(BaseModel):
         obstacles: their kind; None: what the level says.
         env: more arguments of the environment, like `n_blocks` of stacking.
         max_seconds: simulated time limit of an episode; None: the task's own.
-        video: make a video of the first episode.
+        video: make videos: of the first episode, and of the first failure of each kind.
+        trajectories: keep what was measured at every tick, one .npz per episode.
         settings: of the method; see its own settings for the keys.
     """
 
@@ -47,6 +48,7 @@ class RunConfig(BaseModel):
     env: dict[str, Any] = Field(default_factory=dict)
     max_seconds: Annotated[float, Field(gt=0, le=3600)] | None = None
     video: bool = True
+    trajectories: bool = False
     settings: dict[str, Any] = Field(default_factory=dict)
 
     def digest(self) -> str:

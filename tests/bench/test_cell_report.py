@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from example_records import RECORD, some
 
-from onedemo.bench.report import report_text, summary_row, verdict, write_summary
+from onedemo.bench.cell_report import report_text, summary_row, verdict, write_summary
 from onedemo.bench.scenarios import scenarios_of
 from onedemo.bench.statistics import median, quantile, wilson
 from onedemo.configs.schema import load_config
