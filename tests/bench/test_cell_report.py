@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 
 import pytest
@@ -9,7 +8,6 @@ from example_records import RECORD, some
 
 from onedemo.bench.cell_report import report_text, summary_row, verdict, write_summary
 from onedemo.bench.scenarios import scenarios_of
-from onedemo.bench.statistics import median, quantile, wilson
 from onedemo.configs.schema import load_config
 from onedemo.configs.shipped import shipped_config
 
@@ -20,21 +18,6 @@ FAILED = replace(
 REQUIRED = (
     "method", "task", "robot", "level", "episodes", "successes", "safe_successes", "wilson_low", "wilson_high",
 )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "successes, episodes, low, high",
-    [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (49, 50, 0.8950, 0.9965), (81, 263, 0.2553, 0.3662)],
-)
-def test_the_interval_is_wilsons(successes, episodes, low, high):
-    """The last line: Newcombe 1998, table I."""
-    assert wilson(successes, episodes) == (pytest.approx(low, abs=2e-4), pytest.approx(high, abs=2e-4))
-
-
-def test_statistics_of_nothing_say_so():
-    assert wilson(0, 0) == (0.0, 1.0)
-    assert math.isnan(median([]))
-    assert math.isnan(quantile([], 0.99))
 
 
 def test_a_row_counts_what_happened(tmp_path):
