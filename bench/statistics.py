@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+Values = Sequence[float] | np.ndarray
 RESAMPLES = 2000
 """Draws of a bootstrap: the error of its 95 % ends is then some percent of their distance."""
 AT_ONCE = 2_000_000
@@ -28,17 +29,17 @@ def wilson(successes: int, episodes: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def median(values: Sequence[float]) -> float:
+def median(values: Values) -> float:
     """Median; NaN of nothing."""
     return float(np.median(values)) if len(values) else float("nan")
 
 
-def quantile(values: Sequence[float], q: float) -> float:
+def quantile(values: Values, q: float) -> float:
     """Quantile, for example 0.99; NaN of nothing."""
     return float(np.quantile(values, q)) if len(values) else float("nan")
 
 
-def interquartile_mean(values: Sequence[float]) -> float:
+def interquartile_mean(values: Values) -> float:
     """Mean of the middle half: less moved by outliers than the mean, less wasteful than the median; NaN of nothing."""
     from scipy.stats import trim_mean
 
@@ -115,8 +116,8 @@ def holm(values: Sequence[float]) -> list[float]:
 
 
 def hierarchical_bootstrap(
-    groups: Sequence[Sequence[float]],
-    statistic: Callable[[Sequence[float]], float] = interquartile_mean,
+    groups: Sequence[Values],
+    statistic: Callable[[Any], float] = interquartile_mean,
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> tuple[float, float, float]:

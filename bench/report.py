@@ -1,0 +1,174 @@
+"""`report.md`, `report.html`, figures and tables of run folders; what is read is their files, nothing is run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..planner.errors import BadConfig
+from . import report_tables as tables
+from .comparison import Group, groups_by_task, groups_of, metric_tests, success_tests
+from .document import Block, Bullets, Code, Document, Heading, Paragraph
+from .html_page import html_of
+from .markdown_page import markdown_of
+from .methods import REFERENCE
+from .metric_table import METRICS
+from .report_pictures import drawn, with_caption
+from .run_folder import Run, merged, read_run, results_hash
+from .tables_csv import write_tables
+from .videos import videos_in
+
+ORDER = "Whiskers and brackets are Wilson 95 % intervals of single cells; nothing is pooled over levels."
+TESTS = (
+    f"Every method against {REFERENCE} on the scenarios that both have run: the same starts, goals, obstacles and "
+    f"seeds. A : B means that in A pairs {REFERENCE} alone succeeded and in B the method alone; p is of the exact "
+    "McNemar test, after Holm's correction over all tasks and levels of the method. The number of episodes was fixed "
+    "by the config before the first one ran."
+)
+DIFFERENCES = (
+    f"Means over pairs of scenarios, {REFERENCE} less the method, with studentized bootstrap 95 % intervals (seed 0). "
+    "A metric of successes compares pairs in which both succeeded. Holm's correction is over all tasks and levels of a "
+    "method and a metric."
+)
+
+
+def write_report(folder: Path) -> list[Path]:
+    """The report of one run folder, written into it; the files written, the report itself first.
+
+    Raises:
+        BadConfig: the folder is none, or a file in it cannot be read.
+    """
+    return write_report_of([folder], folder)
+
+
+def write_report_of(folders: list[Path], output: Path) -> list[Path]:
+    """The report of several run folders of the same scenarios as one; the files written, the report itself first.
+
+    Raises:
+        BadConfig: a folder cannot be used, they do not belong together, or nothing can be written.
+    """
+    run = merged([read_run(folder) for folder in folders])
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        document = _document(run, output)
+        files = [output / "report.md", output / "report.html"]
+        for file, text in zip(files, (markdown_of(document), html_of(document)), strict=True):
+            file.write_text(text, encoding="utf-8")
+        return files + write_tables(run, output)
+    except OSError as error:
+        raise BadConfig(output, "", f"no report can be written: {error.strerror or error}") from None
+
+
+def _document(run: Run, output: Path) -> Document:
+    groups = groups_of(run)
+    pictures = drawn(run, groups, output)
+    shown = {kind: with_caption(found, CAPTIONS[kind]) for kind, found in pictures.items()}
+    names = list(dict.fromkeys(cell.name for cell in run.cells))
+    document = Document(f"{', '.join(names)}: {len(groups)} cells, {sum(len(g.records) for g in groups)} episodes")
+    document.blocks += [
+        *_opening(run, groups),
+        Heading(2, "Safe success"),
+        tables.headline(groups, lambda group: group.safe_success),
+        *shown["success"],
+        Heading(2, "Success"),
+        tables.headline(groups, lambda group: group.success),
+        tables.counts(groups),
+        *_tests(groups),
+        *([Heading(2, "Success against the speed of obstacles"), *shown["speed"]] if shown["speed"] else []),
+        Heading(2, "Failures"),
+        *shown["failures"],
+        *_failures(groups, output),
+        Heading(2, "Quality of motion"),
+        *_metrics(groups),
+        *shown["clearance"],
+        Heading(2, "Planner time"),
+        tables.timing(groups),
+        *shown["timing"],
+        Heading(2, "What each method needs"),
+        tables.costs(groups),
+        *_repeating(run),
+    ]
+    return document
+
+
+CAPTIONS = {
+    "success": f"Safe success (success without any unwanted contact) by level. {ORDER}",
+    "speed": f"Safe success against the largest speed of the scenario's obstacles. {ORDER.split(';')[0]}.",
+    "failures": "How the episodes of each cell ended, by the taxonomy of the tasks.",
+    "clearance": "Distribution over episodes with obstacles of the smallest clearance of robot and held object.",
+    "timing": "Time of the policy per tick: median, 99th percentile (medians over episodes), and the longest of all.",
+}
+
+
+def _opening(run: Run, groups: list[Group]) -> list[Block]:
+    missing = sum(max(0, group.cell.planned - len(group.records)) for group in groups)
+    items = [
+        "Success is judged by the simulator; safe success is success without any unwanted contact.",
+        *([f"Unfinished: {missing} of the planned episodes are missing."] if missing else []),
+        *run.warnings,
+    ]
+    return [Bullets(items)]
+
+
+def _tests(groups: list[Group]) -> list[Block]:
+    safe = success_tests(groups, lambda record: record.safe_success)
+    if not safe:
+        return []
+    plain = success_tests(groups, lambda record: record.success)
+    tests = [Heading(3, "Safe success"), tables.success_tests(groups, safe)]
+    tests += [Heading(3, "Success"), tables.success_tests(groups, plain)]
+    return [Heading(2, f"Paired tests against {REFERENCE}"), Paragraph(TESTS), *tests]
+
+
+def _failures(groups: list[Group], output: Path) -> list[Block]:
+    table = tables.failures(groups, videos_in(output))
+    return [table] if table.rows else [Paragraph("None.")]
+
+
+def _metrics(groups: list[Group]) -> list[Block]:
+    blocks: list[Block] = []
+    used: list[str] = []
+    for (task, _), some in groups_by_task(groups).items():
+        names = tables.known_metrics(some)
+        if names:
+            blocks += [Heading(3, task), tables.metrics(some, names)]
+            used += names
+    if not blocks:
+        return [Paragraph("No episode has any metric.")]
+    tests = metric_tests(groups)
+    said = Paragraph(
+        "Interquartile means over episodes; those of lengths, times, errors and smoothness over successes."
+    )
+    meanings = [f"{m.words}: {m.meaning}{_better(m.better)}" for name, m in METRICS.items() if name in used]
+    differences = (
+        [Heading(3, "Paired differences"), Paragraph(DIFFERENCES), tables.metric_tests(groups, tests)] if tests else []
+    )
+    return [said, *blocks, Bullets(meanings), *differences]
+
+
+def _better(better: str) -> str:
+    return f" ({better} is better)" if better else ""
+
+
+def _repeating(run: Run) -> list[Block]:
+    environment = {key: value for key, value in run.environment.items() if key not in ("packages", "command")}
+    packages = run.environment.get("packages")
+    versions = (
+        ", ".join(f"{name} {version}" for name, version in packages.items()) if isinstance(packages, dict) else ""
+    )
+    command = run.command or "\n".join(f"onedemo run {folder.name}/config.yaml" for folder in run.folders)
+    return [
+        Heading(2, "How to repeat it"),
+        Code(command),
+        Bullets(
+            [
+                f"hash of the scenarios: {run.scenarios}",
+                f"hash of the results, times left out: {results_hash(run)}",
+                *(f"{key}: {value}" for key, value in environment.items()),
+                *([f"versions: {versions}"] if versions else []),
+            ]
+        ),
+        Paragraph(
+            "Every episode is in episodes.jsonl and episodes.csv, every cell in summary.csv, the whole config in "
+            "config.yaml, starts and obstacles in scenarios.json; figures are there as PNG and PDF."
+        ),
+    ]
