@@ -36,7 +36,7 @@ def run(
     """Run episodes of a config and write a report, a figure and a video.
 
     Keys of a config: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
-    video, settings. Keys with dots reach into settings: settings.motion.guide=0.2
+    video, trajectories, settings. Keys with dots reach into settings: settings.motion.guide=0.2
 
     Finished episodes are kept: running the same config again goes on where it stopped. The last line on
     standard output is the run folder.
@@ -49,6 +49,28 @@ def run(
     from .run import run_config
 
     raise typer.Exit(run_config(config, overrides or [], output, quiet=quiet))
+
+
+@app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders of the same scenarios.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for it; default: the run folder, if there is one.")
+    ] = None,
+) -> None:
+    """Write the report of a run, or compare several: tables, paired tests, figures for a paper, CSV.
+
+    Reads the files of the run folders and runs nothing. report.html needs no server and nothing from elsewhere; its
+    figures are also there as PNG and PDF. The last line on standard output is the page.
+
+    Examples:
+    - onedemo report runs/stack-0123456789ab
+
+    - onedemo report runs/mine runs/theirs --output comparison
+    """
+    from .report_command import run_report
+
+    run_report(runs, output)
 
 
 @app.command()

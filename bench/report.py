@@ -7,7 +7,7 @@ from pathlib import Path
 from ..planner.errors import BadConfig
 from . import report_tables as tables
 from .comparison import Group, groups_by_task, groups_of, metric_tests, success_tests
-from .document import Block, Bullets, Code, Document, Heading, Paragraph
+from .document import Block, Bullets, Code, Document, Entry, Heading, Link, Paragraph, Table
 from .html_page import html_of
 from .markdown_page import markdown_of
 from .methods import REFERENCE
@@ -85,9 +85,19 @@ def _document(run: Run, output: Path) -> Document:
         *shown["timing"],
         Heading(2, "What each method needs"),
         tables.costs(groups),
+        *_first_episode(output),
         *_repeating(run),
     ]
     return document
+
+
+def _first_episode(output: Path) -> list[Block]:
+    """Figure and video of the first episode, where a run has made them."""
+    files = [f"episode0{suffix}" for suffix in (".png", ".pdf", ".mp4") if (output / f"episode0{suffix}").exists()]
+    rows: list[list[Entry]] = [
+        ["paths in space" if ".mp4" not in file else "video", Link(file, file)] for file in files
+    ]
+    return [Heading(2, "The first episode"), Table(["what", "file"], rows)] if rows else []
 
 
 CAPTIONS = {
@@ -101,7 +111,10 @@ CAPTIONS = {
 
 def _opening(run: Run, groups: list[Group]) -> list[Block]:
     missing = sum(max(0, group.cell.planned - len(group.records)) for group in groups)
+    cells = run.cells
+    words = {"tasks": [c.task for c in cells], "levels": [c.level for c in cells], "methods": [g.label for g in groups]}
     items = [
+        *(f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in words.items()),
         "Success is judged by the simulator; safe success is success without any unwanted contact.",
         *([f"Unfinished: {missing} of the planned episodes are missing."] if missing else []),
         *run.warnings,

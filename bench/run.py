@@ -217,12 +217,13 @@ def _episodes(env: Any, policy: Policy, config: RunConfig, folder: Path, err: An
     if records:
         err.print(f"{len(records)} of {config.episodes} episodes were done before")
     writer = RecordWriter(file)
+    kept = folder / "trajectories" if config.trajectories else None
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     try:
         with Progress(*columns, console=err, transient=True) as progress:
             bar = progress.add_task(f"{config.name} {config.level}", total=config.episodes, completed=len(records))
             for scenario in todo:
-                record, _ = run_episode(env, policy, scenario, config)
+                record, _ = run_episode(env, policy, scenario, config, trajectories=kept)
                 writer.append(record)
                 records[record.index] = record
                 successes = sum(done.success for done in records.values())
@@ -260,5 +261,22 @@ def _report(
         notes.append(f"Video, {seen.speed:.0f} times as fast as the simulation: [{video.name}]({video.name})")
         lines.append(f"video   {video}")
     text = report_text(config, records, row, notes, command)
+    if config.video and not seen.video_problem:
+        with err.status("recording failures"):
+            lines += _failure_videos(env, policy, config, folder, records)
     (folder / "report.md").write_text(text, encoding="utf-8")
+    return lines
+
+
+def _failure_videos(
+    env: Any, policy: Policy, config: RunConfig, folder: Path, records: list[EpisodeRecord]
+) -> list[str]:
+    """Videos of the first failure of each kind; the lines for the terminal."""
+    from .failure_videos import record_video
+    from .videos import chosen, video_of
+
+    lines = []
+    for record in chosen(records):
+        problem = record_video(env, policy, record, config, folder)
+        lines.append(f"failure {problem or folder / video_of(record).file}")
     return lines

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +143,7 @@ def merged(runs: list[Run]) -> Run:
 
 def result_of(record: EpisodeRecord) -> dict[str, Any]:
     """A record without what the clock said."""
-    return {key: value for key, value in asdict(record).items() if key not in TIMINGS}
+    return {field.name: getattr(record, field.name) for field in fields(record) if field.name not in TIMINGS}
 
 
 def results_hash(run: Run) -> str:

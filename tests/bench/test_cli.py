@@ -39,7 +39,9 @@ def called(monkeypatch, capsys, *arguments):
     return stopped.value.code, said.out, said.err
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]])
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["report"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]]
+)
 def test_every_command_explains_itself(command, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = called(monkeypatch, capsys, *command, "--help")
@@ -95,7 +97,10 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["run", "stack", "settings.motion.guide=2", "episodes=1"], "guide"),
         (["run", "stack", "settings.trim=soon", "episodes=1"], "trim"),
         (["run", "stack", "level=L9"], "command line: level"),
-        (["fly"], "No such command 'fly'; onedemo knows: run, plan, perf, "),
+        (["report", "nowhere"], "nowhere: is not a run folder: there is no such folder"),
+        (["report", "a", "b"], "command line: --output: is needed where several runs are compared"),
+        (["report"], "Missing argument 'runs'; usage: onedemo report [OPTIONS] RUN..."),
+        (["fly"], "No such command 'fly'; onedemo knows: run, report, plan, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
@@ -105,7 +110,10 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         ),
         (["perf", "--only"], "Option '--only' requires an argument"),
         (["perf", "now"], "Got unexpected extra argument(s) (now); usage: onedemo perf"),
-        (["perf", "--only", "warp"], "unknown group or line of perf 'warp'; known: controller, planner, step, process"),
+        (
+            ["perf", "--only", "warp"],
+            "unknown group or line of perf 'warp'; known: controller, planner, step, process, report",
+        ),
         (["perf", "--json", "no/x.json"], "--json: no/x.json cannot be written: there is no folder no"),
         (["demo", "import", "x.csv"], "Missing option '--output' / '-o'; usage: onedemo demo import"),
         (["demo", "import", "x.csv", "-o", "y.npz", "--rate", "soon"], "Invalid value for '--rate'"),

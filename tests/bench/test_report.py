@@ -1,0 +1,419 @@
+"""Reports of run folders: what they say, that they say it again, and that nobody's words run in them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import subprocess
+import threading
+from dataclasses import replace
+from html.parser import HTMLParser
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+import numpy as np
+import pytest
+from example_runs import GOLDEN, changed, small_run, with_words
+
+from onedemo.bench.comparison import groups_of, metric_tests, success_tests
+from onedemo.bench.escaping import csv_text, markdown_text, plain, slug
+from onedemo.bench.methods import LOOKS, look_of
+from onedemo.bench.records import FILE, encoded, read_records
+from onedemo.bench.report import write_report, write_report_of
+from onedemo.bench.report_tables import number, p_words
+from onedemo.bench.run_folder import merged, peak_speed, read_run, results_hash
+from onedemo.bench.statistics import holm, mcnemar
+from onedemo.bench.videos import Video, chosen, video_of, videos_in
+from onedemo.planner.errors import BadConfig
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed: apt install chromium")
+HOSTILE = [
+    "<script>document.title = 'ours'</script>",
+    "<img src=x onerror=\"document.title='ours'\">",
+    "[link](javascript:alert(1)) | javascript:alert(1)",
+    "</style></title><svg onload=alert(1)>",
+    "\u202etxt.exe \x00 \x1b[31m `code` # title\n# title",
+    "=HYPERLINK(\"http://x\")",
+    "y" * 10**6,
+]  # fmt: skip
+CELL = '"name": "a", "task": "b", "method": "c", "robot": "d", "level": "e"'
+
+
+class Page(HTMLParser):
+    """All tags with their attributes, and the text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.words = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = small_run(tmp_path_factory.mktemp("runs") / "run", tasks=("stack", "pour"))
+    write_report(folder)
+    return folder
+
+
+def test_the_report_is_the_golden_one(run):
+    """Renew it with `python tests/example_runs.py`, and read what has changed."""
+    assert (run / "report.md").read_text(encoding="utf-8") == GOLDEN.read_text(encoding="utf-8")
+
+
+def test_a_report_written_again_has_the_same_bytes(run):
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert {path.suffix for path in before} >= {".png", ".pdf", ".md", ".html", ".csv"}
+    write_report(run)
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+def test_the_page_needs_nothing_besides_itself(run):
+    text = (run / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert {tag for tag, _ in page.tags} <= {
+        "html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li", "div", "table", "thead",
+        "tbody", "tr", "th", "td", "span", "i", "b", "figure", "figcaption", "img", "a", "pre", "code", "details",
+        "summary",
+    }  # fmt: skip
+    policy = next(each["content"] for tag, each in page.tags if each.get("http-equiv"))
+    assert "default-src 'none'" in policy
+    for _, attributes in page.tags:
+        assert not any(name.startswith("on") for name in attributes)
+        assert attributes.get("src", "data:image/svg+xml;base64,").startswith("data:image/svg+xml;base64,")
+        if "href" in attributes:
+            assert (run / attributes["href"]).is_file()
+    assert len(text) < 3_000_000
+
+
+def test_both_reports_hold_the_same_numbers(run):
+    page, text = (
+        Page((run / "report.html").read_text(encoding="utf-8")),
+        (run / "report.md").read_text(encoding="utf-8"),
+    )
+    words = set(page.words)
+    for line in text.splitlines():
+        if line.startswith("| ") and "---" not in line:
+            for cell in line.replace("\\|", "/").strip("| ").split(" | "):
+                assert cell.replace("\\", "") in words, cell
+
+
+@pytest.mark.parametrize("words", HOSTILE, ids=range(len(HOSTILE)))
+def test_words_of_others_stay_words(tmp_path, words):
+    folder = with_words(small_run(tmp_path / "run", 3, levels=("L4",), methods=("screw", "rrt")), words)
+    write_report(folder)
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert not {"script", "svg", "iframe", "object", "link"} & {tag for tag, _ in page.tags}
+    for _, attributes in page.tags:
+        assert not any(name.startswith("on") for name in attributes)
+        assert "javascript:" not in " ".join(str(value) for value in attributes.values())
+    assert len(text) < 1_500_000
+    report = (folder / "report.md").read_text(encoding="utf-8")
+    assert len(report) < 30_000
+    assert "<script" not in report.replace("\\<", "")
+    assert "](javascript" not in report.replace("\\]", "")
+    assert "\n# title" not in report.split("```")[0]
+    assert not any(c in report + text for c in "\u202e\x00\x1b")
+    widths = {len(row) for row in csv.reader((folder / "episodes.csv").open(encoding="utf-8"))}
+    assert len(widths) == 1
+    for row in csv.DictReader((folder / "episodes.csv").open(encoding="utf-8")):
+        assert not row["detail"].startswith("=")
+
+
+def browse(page: Path, profile: Path, *options):
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", *options]
+    return subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=120)
+
+
+@needs_browser
+def test_nothing_runs_and_nothing_is_asked_for_in_a_browser(tmp_path):
+    asked = []
+
+    class Listener(BaseHTTPRequestHandler):
+        def do_GET(self):
+            asked.append(self.path)
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Listener)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    url = f"http://127.0.0.1:{server.server_port}/"
+    tail = "<script>document.title='ours'</script>"
+    words = f"<script src='{url}s'></script><img src='{url}i' onerror=\"document.title='ours'\">{tail}"
+    folder = with_words(small_run(tmp_path / "run", 3, levels=("L4",), methods=("screw", "rrt")), words)
+    write_report(folder)
+    try:
+        (tmp_path / "asks.html").write_text(f"<img src='{url}control'><script>document.title='ran'</script>")
+        control = browse(tmp_path / "asks.html", tmp_path / "profile", "--dump-dom").stdout
+        dom = browse(folder / "report.html", tmp_path / "profile", "--dump-dom").stdout
+    finally:
+        server.shutdown()
+    assert "<title>ran</title>" in control, "the browser would have run a script"
+    assert asked == ["/control"], "and would have asked"
+    assert "<title>synthetic: 2 cells, 6 episodes</title>" in dom
+    assert "<script" not in dom
+
+
+@needs_browser
+@pytest.mark.parametrize("width, height", [(390, 844), (1280, 900)])
+def test_the_page_is_drawn_on_a_phone_and_on_a_desk(run, tmp_path, width, height):
+    from PIL import Image
+
+    picture = tmp_path / "page.png"
+    browse(
+        run / "report.html",
+        tmp_path / "profile",
+        f"--window-size={width},{height}",
+        f"--screenshot={picture}",
+        "--hide-scrollbars",
+    )
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    assert pixels.shape == (height, width, 3)
+    colored = np.ptp(pixels, axis=2) > 40
+    assert 0.001 < colored.mean() < 0.5, "bars and figures, on white"
+    assert (pixels.min(axis=2) < 100).mean() > 0.005, "letters"
+    assert (pixels[:, :8] > 240).all(), "a margin"
+
+
+def test_runs_of_the_same_scenarios_are_compared_and_others_refused(tmp_path):
+    ours = small_run(tmp_path / "ours", methods=("screw",))
+    theirs = small_run(tmp_path / "theirs", methods=("replay",), levels=("L1", "L4"))
+    files = write_report_of([ours, theirs], tmp_path / "both")
+    text = files[0].read_text(encoding="utf-8")
+    assert "| setting | n | screw | replay |" in text
+    assert "Paired tests against screw" in text
+    assert "onedemo run ours/config.yaml\nonedemo run theirs/config.yaml" in text
+    other = small_run(tmp_path / "other", methods=("replay",), seed=1)
+    with pytest.raises(BadConfig) as refused:
+        write_report_of([ours, other], tmp_path / "both")
+    hashes = [json.loads((folder / "scenarios.json").read_text())["hash"] for folder in (ours, other)]
+    assert str(refused.value).count("\n") == 0
+    assert all(f"{each}" in str(refused.value) for each in (*hashes, ours, other))
+
+
+def test_of_an_episode_in_two_runs_the_first_counts_and_a_difference_is_said(tmp_path):
+    first, second = small_run(tmp_path / "a"), small_run(tmp_path / "b")
+    same = merged([read_run(first), read_run(second)])
+    assert results_hash(same) == results_hash(read_run(first))
+    assert same.warnings == ()
+    changed(second, lambda record: replace(record, success=not record.success, wall_seconds=9.0))
+    again = merged([read_run(first), read_run(second)])
+    assert results_hash(again) == results_hash(same)
+    assert len(again.warnings) == 6
+    assert "12 episodes" in again.warnings[0]
+
+
+def test_the_hash_of_results_knows_no_clock_and_no_order(tmp_path):
+    one = read_run(small_run(tmp_path / "a"))
+    slower = changed(
+        small_run(tmp_path / "b"), lambda record: replace(record, wall_seconds=7.0, tick_us=[1.0, 2.0, 3.0])
+    )
+    lines = (slower / FILE).read_bytes().splitlines(keepends=True)
+    (slower / FILE).write_bytes(b"".join(reversed(lines)))
+    assert results_hash(read_run(slower)) == results_hash(one)
+    other = changed(slower, lambda record: replace(record, seconds=record.seconds + 1e-6))
+    assert results_hash(read_run(other)) != results_hash(one)
+
+
+@pytest.mark.parametrize(
+    "file, content, message",
+    [
+        ("cells.json", "[]", "cells.json: is not a list of at least one cell"),
+        ("cells.json", "{", "cells.json: is not readable JSON"),
+        ("cells.json", '[{"name": 3}]', "cells.json: [0].name: is 3, not of type str"),
+        ("cells.json", f'[{{{CELL}, "episodes": true}}]', "[0].episodes: is True, not of type int"),
+        ("cells.json", f'[{{{CELL}, "episodes": 1, "digest": "../x"}}]', "[0].digest: is '../x'"),
+        ("scenarios.json", "[]", "scenarios.json: scenarios: is not a list of tables"),
+        ("scenarios.json", None, "scenarios.json: does not exist"),
+        ("environment.json", "3", "environment.json: does not hold a table"),
+    ],
+)  # fmt: skip
+def test_a_folder_that_cannot_be_used_is_refused_in_one_line(tmp_path, file, content, message):
+    folder = small_run(tmp_path / "run", 2)
+    if content is None:
+        (folder / file).unlink()
+    else:
+        (folder / file).write_text(content)
+    with pytest.raises(BadConfig) as refused:
+        write_report(folder)
+    assert message in str(refused.value)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_folder_of_one_cell_needs_no_list_of_cells(tmp_path):
+    folder = small_run(tmp_path / "run", levels=("L1",), methods=("screw",))
+    (cell,) = json.loads((folder / "cells.json").read_text())
+    (folder / "cells.json").unlink()
+    described = json.loads((folder / "scenarios.json").read_text())
+    (folder / "scenarios.json").write_text(
+        json.dumps({"digest": cell.pop("digest"), "scenarios": described["scenarios"]})
+    )
+    (folder / "config.yaml").write_text(json.dumps(cell))
+    run = read_run(folder)
+    assert [len(found) for found in run.records.values()] == [12]
+
+
+def test_damaged_lines_and_strangers_are_passed_over_and_counted(tmp_path):
+    folder = small_run(tmp_path / "run", levels=("L1",), methods=("screw",))
+    records, _ = read_records(folder / FILE)
+    extra = [replace(records[0], index=99, metrics={"tilt": "high"}), replace(records[0], cell="f" * 12), records[0]]
+    with (folder / FILE).open("ab") as file:
+        file.write(b"garbage\n" + b"".join(encoded(record) for record in extra) + b'{"crc":1,"rec')
+    run = read_run(folder)
+    assert [len(found) for found in run.records.values()] == [12]
+    assert run.warnings == (
+        "episodes.jsonl: 2 lines are no episode records and were passed over",
+        "episodes.jsonl: 1 episodes are of cells that this run does not have",
+    )
+
+
+def test_an_unfinished_run_has_a_report_that_says_so(tmp_path):
+    folder = small_run(tmp_path / "run", 5)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join(lines[:7]))
+    text = write_report(folder)[0].read_text(encoding="utf-8")
+    assert "Unfinished: 23 of the planned episodes are missing." in text
+    assert "2 of 5" in text
+    (folder / FILE).write_bytes(b"")
+    assert "0 episodes" in write_report(folder)[0].read_text(encoding="utf-8")
+
+
+def test_tests_are_of_pairs(run):
+    groups = groups_of(read_run(run))
+    found = {(t.setting.task, t.setting.level, t.label): t for t in success_tests(groups, lambda r: r.safe_success)}
+    assert len(found) == 8
+    by_place = {(g.setting.task, g.setting.level, g.label): g.records for g in groups}
+    ours, theirs = by_place["pour", "L4", "screw"], by_place["pour", "L4", "rrt"]
+    won = sum(a.safe_success and not b.safe_success for a, b in zip(ours, theirs, strict=True))
+    lost = sum(b.safe_success and not a.safe_success for a, b in zip(ours, theirs, strict=True))
+    test = found["pour", "L4", "rrt"]
+    assert (test.pairs, test.only_reference, test.only_other) == (12, won, lost)
+    family = [t for (_, _, label), t in found.items() if label == "rrt"]
+    assert [t.adjusted for t in family] == holm([mcnemar(t.only_reference, t.only_other) for t in family])
+
+
+def test_pairs_are_matched_by_scenario_and_not_by_order(tmp_path):
+    folder = small_run(tmp_path / "run", levels=("L1",), methods=("screw", "replay"))
+    whole = success_tests(groups_of(read_run(folder)), lambda record: record.success)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join(lines[:12] + lines[17:]))
+    (test,) = success_tests(groups_of(read_run(folder)), lambda record: record.success)
+    assert whole[0].pairs == 12
+    assert test.pairs == 7
+
+
+def test_metrics_of_successes_compare_pairs_in_which_both_succeeded(run):
+    groups = groups_of(read_run(run))
+    tests = {(t.setting.task, t.setting.level, t.label, t.name): t for t in metric_tests(groups)}
+    by_place = {(g.setting.task, g.setting.level, g.label): g.records for g in groups}
+    pairs = zip(by_place["stack", "L1", "screw"], by_place["stack", "L1", "replay"], strict=True)
+    both = [(a.metrics["time_to_goal"], b.metrics["time_to_goal"]) for a, b in pairs if a.success and b.success]
+    test = tests["stack", "L1", "replay", "time_to_goal"]
+    assert test.difference.pairs == len(both)
+    assert test.difference.mean == pytest.approx(np.mean([a - b for a, b in both]))
+    assert ("stack", "L1", "replay", "clearance") not in tests
+    assert tests["stack", "L4", "replay", "clearance"].difference.pairs == 12
+
+
+def test_two_cells_of_one_method_are_told_apart(tmp_path):
+    folder = small_run(tmp_path / "run", 3, levels=("L1",), methods=("screw",))
+    cells = json.loads((folder / "cells.json").read_text())
+    other = {**cells[0], "digest": "ab" * 6, "settings": {"motion": {"guide": 0.2}}}
+    (folder / "cells.json").write_text(json.dumps([other, cells[0]]))
+    groups = groups_of(read_run(folder))
+    assert sorted(group.label for group in groups) == sorted(["screw (abab)", f"screw ({cells[0]['digest'][:4]})"])
+
+
+def test_a_method_looks_the_same_in_every_report():
+    looks = [(look.color, look.marker, look.line) for look in LOOKS.values()]
+    assert len(set(looks)) == len(looks)
+    assert look_of("screw") == LOOKS["screw"]
+    assert look_of("mine") == look_of("mine")
+
+
+def test_speeds_are_those_of_the_drawn_obstacles(tmp_path):
+    run = read_run(small_run(tmp_path / "run"))
+    listed = json.loads((tmp_path / "run" / "scenarios.json").read_text())["scenarios"]
+    assert {key[2] for key in run.speeds} == {"L4"}
+    assert len(run.speeds) == 12
+    swinging = next(entry for entry in listed if entry["obstacles"] and entry["obstacles"][0]["frequency"])
+    expected = 0.1 * swinging["obstacles"][0]["frequency"]
+    assert run.speeds["stack", "Panda", "L4", swinging["seed"]] == pytest.approx(expected)
+    assert peak_speed({"long": [0.0, 0.1, 0.0], "short": [0.0, 0.0, 0.2], "frequency": 2.0}) == pytest.approx(0.4)
+    assert peak_speed("x") == peak_speed({"long": "x", "frequency": 1}) == 0.0
+
+
+def test_videos_are_of_the_first_failure_of_each_kind_of_each_method(run):
+    records = [record for found in read_run(run).records.values() for record in found]
+    few, many = chosen(records, 3), chosen(records, 100)
+    assert few == many[:3]
+    assert len({record.method for record in few}) == 3
+    kinds = {(record.method, record.failure_reason) for record in records if not record.success}
+    assert {(record.method, record.failure_reason) for record in many} == kinds
+    assert len(many) == len(kinds)
+    for record in many:
+        same = (r for r in records if (r.method, r.failure_reason) == (record.method, record.failure_reason))
+        assert next(r for r in same if not r.success) == record
+
+
+def test_a_video_is_linked_from_its_failure(tmp_path):
+    folder = small_run(tmp_path / "run")
+    records = [record for found in read_run(folder).records.values() for record in found]
+    record = chosen(records)[0]
+    video = video_of(record)
+    (folder / "videos").mkdir()
+    (folder / video.file).touch()
+    (folder / "videos" / "javascript:alert(1).mp4").touch()
+    assert videos_in(folder) == [Video(record.cell, record.index, record.seed, record.failure_reason, video.file)]
+    text = write_report(folder)[0].read_text(encoding="utf-8")
+    assert text.count("[video](videos/") == 1
+    assert f"[video]({video.file})" in text
+    assert f'href="{video.file}"' in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_tables_hold_every_episode_and_every_cell(run):
+    with (run / "episodes.csv").open(encoding="utf-8") as file:
+        episodes = list(csv.DictReader(file))
+    with (run / "summary.csv").open(encoding="utf-8") as file:
+        cells = list(csv.DictReader(file))
+    assert len(episodes) == 144
+    assert len(cells) == 12
+    for cell in cells:
+        own = [row for row in episodes if row["cell"] == cell["cell"]]
+        safe = sum(row["success"] == row["safe"] == "1" for row in own)
+        assert safe == int(cell["safe_successes"])
+        assert float(cell["safe_success_rate"]) == pytest.approx(safe / 12)
+        assert float(cell["safe_success_low"]) <= safe / 12 <= float(cell["safe_success_high"])
+        assert float(cell["tick_us_max"]) == pytest.approx(max(float(row["tick_us_max"]) for row in own), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "value, text",
+    [(0.0, "0"), (0.012345, "0.0123"), (1.2345, "1.23"), (12.345, "12.3"), (123.45, "123"), (-0.5, "-0.500"),
+     (1e-9, "0.0000"), (float("nan"), "–"), (99.96, "100")],
+)  # fmt: skip
+def test_numbers_have_three_digits(value, text):
+    assert number(value) == text
+
+
+def test_small_pieces_of_text():
+    assert p_words(0.0004) == "< 0.001"
+    assert p_words(0.04) == "0.040"
+    assert p_words(float("nan")) == "–"
+    assert plain("a\x00\n b\u2028c") == "a b c"
+    assert len(plain("z" * 10**7)) == 300
+    assert markdown_text("a|b") == "a\\|b"
+    assert csv_text("+1") == "'+1"
+    assert slug("../../Etc passwd<>") == "etc-passwd"
+    assert slug("***") == "unnamed"
