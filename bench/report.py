@@ -63,7 +63,8 @@ def _document(run: Run, output: Path) -> Document:
     pictures = drawn(run, groups, output)
     shown = {kind: with_caption(found, CAPTIONS[kind]) for kind, found in pictures.items()}
     names = list(dict.fromkeys(cell.name for cell in run.cells))
-    document = Document(f"{', '.join(names)}: {len(groups)} cells, {sum(len(g.records) for g in groups)} episodes")
+    cells, episodes = len(groups), sum(len(group.records) for group in groups)
+    document = Document(f"{', '.join(names)}: {_counted(cells, 'cell')}, {_counted(episodes, 'episode')}")
     document.blocks += [
         *_opening(run, groups),
         Heading(2, "Safe success"),
@@ -98,6 +99,10 @@ def _first_episode(output: Path) -> list[Block]:
         ["paths in space" if ".mp4" not in file else "video", Link(file, file)] for file in files
     ]
     return [Heading(2, "The first episode"), Table(["what", "file"], rows)] if rows else []
+
+
+def _counted(count: int, word: str) -> str:
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 
 CAPTIONS = {
@@ -143,7 +148,9 @@ def _metrics(groups: list[Group]) -> list[Block]:
     for (task, _), some in groups_by_task(groups).items():
         names = tables.known_metrics(some)
         if names:
-            blocks += [Heading(3, task), tables.metrics(some, names)]
+            main = [name for name in names if METRICS[name].paired]
+            blocks += [Heading(3, task), tables.metrics(some, main)] if main else []
+            blocks += [tables.metrics(some, names, f"All metrics of {task}")] if names != main else []
             used += names
     if not blocks:
         return [Paragraph("No episode has any metric.")]
@@ -168,7 +175,9 @@ def _repeating(run: Run) -> list[Block]:
     versions = (
         ", ".join(f"{name} {version}" for name, version in packages.items()) if isinstance(packages, dict) else ""
     )
-    command = run.command or "\n".join(f"onedemo run {folder.name}/config.yaml" for folder in run.folders)
+    folders = [folder.name for folder in run.folders]
+    again = [f"onedemo report {' '.join(folders)} --output comparison"] if len(folders) > 1 else []
+    command = run.command or "\n".join([*(f"onedemo run {name}/config.yaml" for name in folders), *again])
     return [
         Heading(2, "How to repeat it"),
         Code(command),

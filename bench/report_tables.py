@@ -28,6 +28,8 @@ from .statistics import interquartile_mean, median
 from .videos import Video
 
 NOTHING = "–"
+MANY = 20
+"""Rows from which on a list is not shown at once."""
 
 
 def settings_of(groups: list[Group]) -> dict[Setting, str]:
@@ -97,14 +99,14 @@ def metric_tests(groups: list[Group], tests: list[MetricTest]) -> Table:
     return Table(head, rows, 3, "Paired differences of metrics")
 
 
-def metrics(groups: list[Group], names: list[str]) -> Table:
-    """Interquartile means of the metrics that groups of one task have."""
+def metrics(groups: list[Group], names: list[str], title: str = "") -> Table:
+    """Interquartile means of some metrics of the groups of one task."""
     settings, rows = settings_of(groups), []
     for group in groups:
         values = [(METRICS[name].factor, group.values(name)) for name in names]
         means = [number(factor * interquartile_mean(known)) if len(known) else NOTHING for factor, known in values]
         rows.append([settings[group.setting], group.label, *means])
-    return Table(["setting", "method", *(METRICS[name].title for name in names)], rows, 2)
+    return Table(["setting", "method", *(METRICS[name].title for name in names)], rows, 2, title)
 
 
 def known_metrics(groups: list[Group]) -> list[str]:
@@ -128,7 +130,8 @@ def failures(groups: list[Group], videos: list[Video]) -> Table:
                 rows[key] = [group.label, *words, str(record.seed), link, str(total[key])]
     order = [(label, outcome) for label in labels_of(groups) for outcome in outcomes_of(groups)]
     head = ["method", "failure", "setting", "stage", "explanation", "seed", "video", "how many"]
-    return Table(head, [rows[key] for key in order if key in rows], 5)
+    found = [rows[key] for key in order if key in rows]
+    return Table(head, found, 5, "The first failure of each kind of each method" if len(found) > MANY else "")
 
 
 def outcomes_of(groups: list[Group]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -284,3 +285,9 @@ def test_every_metric_is_explained():
         assert all(value is None or math.isfinite(value) for value in found.values())
     assert known == set(METRICS)
     env.close()
+
+
+def test_the_documentation_explains_every_metric():
+    text = (Path(__file__).parents[2] / "docs" / "comparison.md").read_text(encoding="utf-8")
+    for metric in METRICS.values():
+        assert f"| {metric.title} | {metric.meaning} | {metric.better or '–'} |" in text
