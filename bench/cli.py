@@ -53,7 +53,7 @@ def run(
 
 @app.command()
 def report(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders of the same scenarios.")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of the same scenarios.")],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for it; default: the run folder, if there is one.")
     ] = None,

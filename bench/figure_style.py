@@ -10,6 +10,8 @@ from typing import Any
 
 COLUMN = 3.5
 """Width of a column of a two-column paper [inch]."""
+LEGEND_ROW = 0.155
+"""Height of a row of a legend [inch]."""
 DOTS = 300
 """Per inch of the pixel images."""
 INK, FAINT, GRID = "#222222", "#767676", "#e4e4e4"
@@ -59,11 +61,17 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float) -> tuple[Any, Any]:
-    """A figure of one column's width with one axes; `height` in inches."""
+def new_figure(height: float, entries: int, columns: int) -> tuple[Any, Any]:
+    """A figure of one column's width with one axes.
+
+    Args:
+        height: without the legend [inch].
+        entries: of the legend.
+        columns: of the legend.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(COLUMN, height), layout="constrained")
+    figure = Figure(figsize=(COLUMN, height + LEGEND_ROW * -(-entries // columns)), layout="constrained")
     return figure, figure.add_subplot()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from .comparison import SAFE, UNSAFE, rank
 from .figure_style import FAINT, INK, legend_above, new_figure
 from .methods import look_of
-from .rate_figures import Series, share_axis
+from .rate_figures import COLUMNS, HEIGHT, Series, share_axis
 from .statistics import median
 
 OUTCOMES = {
@@ -26,6 +26,8 @@ OUTCOMES = {
 }
 """Color, hatch and words of every outcome, in the order of bars."""
 OTHER = ("#444444", "", "other")
+TALLEST = 8.3
+"""Of a figure that must fit on a page with its caption [inch]."""
 TICK_MS = 20.0
 """Time between two ticks at the default 50 Hz."""
 FARTHEST = 120.0
@@ -39,11 +41,13 @@ def failures(lines: list[Series]) -> Any:
     rows = [(group.setting.level, line.label, group) for line in lines for group in line.groups if group.records]
     rows.sort(key=lambda row: rank(row[0]))
     levels = list(dict.fromkeys(level for level, _, _ in rows))
-    figure, axes = new_figure(min(8.5, 0.75 + 0.155 * len(rows) + 0.1 * len(levels)))
+    outcomes = {outcome for _, _, group in rows for outcome in group.outcomes}
+    height = min(TALLEST, 0.55 + 0.155 * len(rows) + 0.1 * len(levels))
+    figure, axes = new_figure(height, len(outcomes), COLUMNS)
     places = np.array([k + 0.7 * levels.index(level) for k, (level, _, _) in enumerate(rows)])
     used: dict[str, Any] = {}
     left = np.zeros(len(rows))
-    for outcome in (*OUTCOMES, *sorted({o for _, _, group in rows for o in group.outcomes} - set(OUTCOMES))):
+    for outcome in (*OUTCOMES, *sorted(outcomes - set(OUTCOMES))):
         share = np.array([group.outcomes[outcome] / len(group.records) for _, _, group in rows])
         if share.any():
             color, hatch, words = OUTCOMES.get(outcome, OTHER)
@@ -54,11 +58,12 @@ def failures(lines: list[Series]) -> Any:
         axes.text(1.02, middle, level, ha="left", va="center", fontweight="bold", clip_on=False)
     axes.set_yticks(places, [label for _, label, _ in rows])
     axes.set(xlim=(0.0, 1.0), ylim=(places[-1] + 0.6, places[0] - 0.6), xlabel="share of episodes")
-    axes.tick_params(axis="y", length=0)
+    room = 72.0 * (height - 0.55) / (places[-1] + 1.0)
+    axes.tick_params(axis="y", length=0, labelsize=min(7.5, 0.85 * room))
     axes.grid(False)
     axes.spines["left"].set_visible(False)
     words = [entry[2] for entry in (*OUTCOMES.values(), OTHER) if entry[2] in used]
-    legend_above(figure, [used[word] for word in words], words, 3)
+    legend_above(figure, [used[word] for word in words], words, COLUMNS)
     return figure
 
 
@@ -78,7 +83,7 @@ def timing(lines: list[Series]) -> Any | None:
     known = [(line, ticks) for line, ticks in known if ticks]
     if not known:
         return None
-    figure, axes = new_figure(0.8 + 0.2 * len(known))
+    figure, axes = new_figure(0.7 + 0.2 * len(known), 4, 4)
     for row, (line, ticks) in enumerate(known):
         values = np.maximum(np.array([entry[:3] for entry in ticks]) / 1e3, 1e-6)
         middle, late, most = median(values[:, 0]), median(values[:, 1]), float(values[:, 2].max())
@@ -117,7 +122,7 @@ def clearance(lines: list[Series]) -> Any | None:
     known = [(line, found) for line, found in known if len(found)]
     if not known:
         return None
-    figure, axes = new_figure(2.5)
+    figure, axes = new_figure(HEIGHT, len(known), COLUMNS)
     handles = []
     farthest = min(FARTHEST, max(20.0, *(float(np.quantile(found, 0.98)) for _, found in known)))
     for line, found in known:
@@ -128,5 +133,5 @@ def clearance(lines: list[Series]) -> Any | None:
         handles += axes.step(x, np.append(share, 1.0), where="post", markevery=(every // 2, every), **style)
     axes.set(xlim=(0.0, farthest), xlabel="smallest clearance of the episode [mm]; 0: contact")
     share_axis(axes, "share of episodes with less")
-    legend_above(figure, handles, [line.label for line, _ in known], 3)
+    legend_above(figure, handles, [line.label for line, _ in known], COLUMNS)
     return figure

@@ -13,6 +13,8 @@ from .figure_style import legend_above, new_figure
 from .methods import look_of, place_of
 from .run_folder import Key
 
+HEIGHT, COLUMNS = 2.2, 3
+"""Of a figure without its legend [inch]; columns of the legend."""
 SPREAD = 0.62
 """Of the room between two ticks, the part over which methods are spread, so that their intervals do not hide."""
 EDGES = (0.0, 0.1, 0.2, 0.3)
@@ -59,7 +61,7 @@ def by_level(lines: list[Series]) -> Any:
     """Safe success against level."""
     levels = list(dict.fromkeys(g.setting.level for line in lines for g in line.groups))
     levels.sort(key=rank)
-    figure, axes = new_figure(2.5)
+    figure, axes = new_figure(HEIGHT, len(lines), COLUMNS)
     handles = []
     for line, shift in zip(lines, _shifts(len(lines)), strict=True):
         known = {group.setting.level: group.safe_success for group in line.groups if group.records}
@@ -74,7 +76,7 @@ def by_level(lines: list[Series]) -> Any:
     axes.set_xticks(range(len(levels)), levels)
     axes.set(xlim=(-0.5, len(levels) - 0.5), xlabel="level")
     share_axis(axes, "safe success")
-    legend_above(figure, [h for h, _ in handles], [label for _, label in handles], 3)
+    legend_above(figure, [h for h, _ in handles], [label for _, label in handles], COLUMNS)
     return figure
 
 
@@ -88,7 +90,7 @@ def by_speed(lines: list[Series], speeds: dict[Key, float]) -> Any | None:
     known = [(line, bins) for line, bins in known if bins]
     if not known:
         return None
-    figure, axes = new_figure(2.5)
+    figure, axes = new_figure(HEIGHT, len(known), COLUMNS)
     handles = []
     for (line, bins), shift in zip(known, _shifts(len(known)), strict=True):
         found = sorted(bins)
@@ -100,7 +102,7 @@ def by_speed(lines: list[Series], speeds: dict[Key, float]) -> Any | None:
     axes.set(xlim=(-0.5, most + 0.5), xlabel="largest speed of an obstacle [m/s]")
     axes.set_xticks(range(most + 1), words[: most + 1])
     share_axis(axes, "safe success")
-    legend_above(figure, handles, [line.label for line, _ in known], 3)
+    legend_above(figure, handles, [line.label for line, _ in known], COLUMNS)
     return figure
 
 

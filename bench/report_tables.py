@@ -57,7 +57,7 @@ def headline(groups: list[Group], rate: Callable[[Group], Rate]) -> Table:
 
 
 def counts(groups: list[Group]) -> Table:
-    """Episodes, successes and failures of every cell as whole numbers."""
+    """Episodes, successes, contacts, starts that had no room for the obstacles, and failures as whole numbers."""
     names = settings_of(groups)
     reasons = [o for o in outcomes_of(groups) if o not in (SAFE, UNSAFE)]
     rows: list[list[Entry]] = []
@@ -65,9 +65,20 @@ def counts(groups: list[Group]) -> Table:
         done = f"{len(group.records)}" + (
             f" of {group.cell.planned}" if len(group.records) < group.cell.planned else ""
         )
-        numbers = [str(group.safe_success.count), str(group.success.count)]
+        touching = sum(record.contacts > 0 for record in group.records)
+        refused = sum(record.refused for record in group.records)
+        numbers = [str(value) for value in (group.safe_success.count, group.success.count, touching, refused)]
         rows.append([names[group.setting], group.label, done, *numbers, *(str(group.outcomes[o]) for o in reasons)])
-    head = ["setting", "method", "episodes", "safe successes", "successes", *map(words_of, reasons)]
+    head = [
+        "setting",
+        "method",
+        "episodes",
+        "safe successes",
+        "successes",
+        "touching an obstacle",
+        "refused starts",
+        *map(words_of, reasons),
+    ]
     return Table(head, rows, 2, "Counts of every cell")
 
 

@@ -28,7 +28,17 @@ def write_tables(run: Run, output: Path) -> list[Path]:
     head = [*EPISODE_WORDS, *EPISODE_NUMBERS, *EPISODE_ENDS, *METRICS, *TICKS]
     _write(episodes, head, (_episode(record) for group in groups for record in group.records))
     rates = [f"{rate}{part}" for rate in RATES for part in ("es", "_rate", "_low", "_high")]
-    head = [*EPISODE_WORDS, "planned", "episodes", *rates, "failures", *(f"{name}_iqm" for name in METRICS), *TICKS[:3]]
+    head = [
+        *EPISODE_WORDS,
+        "planned",
+        "episodes",
+        *rates,
+        "touching",
+        "refused",
+        "failures",
+        *(f"{name}_iqm" for name in METRICS),
+        *TICKS[:3],
+    ]
     _write(summary, head, map(_cell, groups))
     return [episodes, summary]
 
@@ -61,7 +71,8 @@ def _cell(group: Group) -> list[Any]:
     ticks = list(zip(*(record.tick_us[:3] for record in group.records), strict=True))
     times = [median(ticks[0]), median(ticks[1]), max(ticks[2])] if ticks else [None] * 3
     words = [csv_text(word) for word in (cell.digest, cell.task, cell.robot, cell.level, cell.method)]
-    return [*words, cell.planned, count, *rates, csv_text(listed), *metrics, *map(_value, times)]
+    touching, refused = sum(r.contacts > 0 for r in group.records), sum(r.refused for r in group.records)
+    return [*words, cell.planned, count, *rates, touching, refused, csv_text(listed), *metrics, *map(_value, times)]
 
 
 def _value(value: Any) -> Any:
