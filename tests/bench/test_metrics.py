@@ -209,6 +209,21 @@ def test_fcl_and_the_simulator_agree_on_an_episode(stack, seed):
     assert found.smallest == pytest.approx(max(info["min_obstacle_distance"], 0.0), abs=(speed + 0.5) * PHYSICS_DT)
 
 
+def test_what_moves_is_met_where_it_is_at_that_tick(stack):
+    """An obstacle that comes nearer to an arm at rest: the smallest distance is that of the last tick alone."""
+    env, solids = stack
+    recorder = TraceRecorder(env)
+    coming = Intruder(Sphere(0.05), (0.3, 0.0, 1.2), long=(0.0, 0.3, 0.0), frequency=1.0, phase=-1.2)
+    env.reset(seed=0, options={"obstacles": [coming]})
+    recorder(env, None)
+    for _ in range(25):
+        *_, info = env.step(np.zeros(8))
+        recorder(env, None)
+    found = solids.clearance(recorder.trace())
+    assert found.second == pytest.approx(0.5)
+    assert found.smallest == pytest.approx(info["min_obstacle_distance"], abs=1e-4)
+
+
 def test_clearance_without_culling_is_the_same(stack, monkeypatch):
     env, solids = stack
     trace, _ = recorded(env, 3, 20, [Intruder(Sphere(0.05), (0.2, 0.1, 1.2))])
