@@ -17,7 +17,7 @@ from .run_folder import Run, merged, read_run, results_hash
 from .tables_csv import write_tables
 from .videos import videos_in
 
-ORDER = "Whiskers and brackets are Wilson 95 % intervals of single cells; nothing is pooled over levels."
+INTERVALS = "Whiskers and brackets are Wilson 95 % intervals of single cells; nothing is pooled over levels."
 TESTS = (
     f"Every method against {REFERENCE} on the scenarios that both have run: the same starts, goals, obstacles and "
     f"seeds. A : B means that in A pairs {REFERENCE} alone succeeded and in B the method alone; p is of the exact "
@@ -106,11 +106,13 @@ def _counted(count: int, word: str) -> str:
 
 
 CAPTIONS = {
-    "success": f"Safe success (success without any unwanted contact) by level. {ORDER}",
-    "speed": f"Safe success against the largest speed of the scenario's obstacles. {ORDER.split(';')[0]}.",
+    "success": f"Safe success (success without any unwanted contact) by level. {INTERVALS}",
+    "speed": "Safe success of all episodes with obstacles against the largest speed of any of them in the scenario, "
+    "with Wilson 95 % intervals.",
     "failures": "How the episodes of each cell ended, by the taxonomy of the tasks.",
-    "clearance": "Distribution over episodes with obstacles of the smallest clearance of robot and held object.",
-    "timing": "Time of the policy per tick: median, 99th percentile (medians over episodes), and the longest of all.",
+    "clearance": "Distribution of the smallest clearance of robot and held object over all episodes with obstacles.",
+    "timing": "Time of the policy per tick over all levels: median and 99th percentile (medians over episodes), and the "
+    "longest of all.",
 }
 
 
