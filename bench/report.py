@@ -111,8 +111,8 @@ CAPTIONS = {
     "with Wilson 95 % intervals.",
     "failures": "How the episodes of each cell ended, by the taxonomy of the tasks.",
     "clearance": "Distribution of the smallest clearance of robot and held object over all episodes with obstacles.",
-    "timing": "Time of the policy per tick over all levels: median and 99th percentile (medians over episodes), and the "
-    "longest of all.",
+    "timing": "Time of the policy per tick over all levels: median and 99th percentile (medians over episodes), "
+    "and the longest of all.",
 }
 
 
