@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from .escaping import plain
 from .methods import REFERENCE, place_of
 from .metric_table import METRICS, Metric
 from .records import EpisodeRecord
@@ -19,6 +20,8 @@ from .tasks import TASKS
 
 ORDERED = ("L0", "L1", "L2", "L3", "L4")
 """Levels that get harder one after the other."""
+LONGEST_CHANGES = 40
+"""Characters of the settings in a label."""
 SAFE, UNSAFE = "safe success", "unsafe success"
 """The two outcomes that are no failure."""
 
@@ -67,7 +70,7 @@ class Group:
     @property
     def setting(self) -> Setting:
         """What it can be compared on."""
-        return Setting(self.cell.task, self.cell.robot, self.cell.level)
+        return _setting(self.cell)
 
     @cached_property
     def success(self) -> Rate:
@@ -99,19 +102,34 @@ def outcome_of(record: EpisodeRecord) -> str:
 
 
 def groups_of(run: Run) -> list[Group]:
-    """All cells in the order of tables: task, robot, level, method."""
-    taken = Counter((cell.task, cell.robot, cell.level, cell.method) for cell in run.cells)
-    names = Counter((cell.task, cell.robot, cell.level, cell.method, cell.name) for cell in run.cells)
+    """All cells in the order of tables: task, robot, level, method.
+
+    Cells of one method on the same setting are told apart by what was changed of its settings, else by their digests.
+    """
+    alike = Counter((_setting(cell), cell.method) for cell in run.cells)
+    same = Counter((_setting(cell), cell.method, _changes(cell.settings)) for cell in run.cells)
     found = []
     for cell in run.cells:
-        place = (cell.task, cell.robot, cell.level, cell.method)
-        label = cell.method
-        if taken[place] > 1:
-            label += f" ({cell.name if names[(*place, cell.name)] == 1 else cell.digest[:4]})"
-        found.append(Group(label, cell, run.records.get(cell.digest, [])))
+        words = _changes(cell.settings) if alike[_setting(cell), cell.method] > 1 else ""
+        if same[_setting(cell), cell.method, _changes(cell.settings)] > 1:
+            words = f"{words} ({cell.digest[:4]})".strip()
+        found.append(Group(f"{cell.method} {words}".strip(), cell, run.records.get(cell.digest, [])))
     return sorted(
         found, key=lambda group: (*place_of_setting(group.setting), *place_of(group.cell.method), group.label)
     )
+
+
+def _setting(cell: Cell) -> Setting:
+    return Setting(cell.task, cell.robot, cell.level)
+
+
+def _changes(settings: dict[str, Any], prefix: str = "") -> str:
+    """Settings in one line, as they are written on the command line; "" of none."""
+    parts = []
+    for key, value in sorted(settings.items()):
+        name = f"{prefix}{key}"
+        parts.append(_changes(value, f"{name}.") if isinstance(value, dict) else f"{name}={value}")
+    return plain(" ".join(parts), LONGEST_CHANGES)
 
 
 def groups_by_task(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:

@@ -87,7 +87,7 @@ def timing(lines: list[Series]) -> Any | None:
     for row, (line, ticks) in enumerate(known):
         values = np.maximum(np.array([entry[:3] for entry in ticks]) / 1e3, 1e-6)
         middle, late, most = median(values[:, 0]), median(values[:, 1]), float(values[:, 2].max())
-        color = look_of(line.method).color
+        color = look_of(line.label).color
         axes.plot([middle, most], [row, row], color=color, linewidth=0.8)
         axes.plot(middle, row, "o", color=color, label="median" if row == 0 else None)
         axes.plot(late, row, "|", color=color, markersize=8, markeredgewidth=1.4)
@@ -126,7 +126,7 @@ def clearance(lines: list[Series]) -> Any | None:
     handles = []
     farthest = min(FARTHEST, max(20.0, *(float(np.quantile(found, 0.98)) for _, found in known)))
     for line, found in known:
-        look, share = look_of(line.method), np.linspace(0.0, 1.0, min(len(found), CURVE) + 1)
+        look, share = look_of(line.label), np.linspace(0.0, 1.0, min(len(found), CURVE) + 1)
         x = np.append(np.quantile(found, share, method="inverted_cdf"), max(farthest, found[-1]))
         style = {"color": look.color, "linestyle": look.line, "marker": look.marker, "markeredgewidth": 0.0}
         every = max(1, len(share) // 6)

@@ -40,7 +40,7 @@ def series_of(groups: Iterable[Group]) -> list[Series]:
 
 def _points(axes: Any, line: Series, x: np.ndarray, rates: list[Rate], *, joined: bool = True) -> Any:
     """Rates with their intervals; returns the handle for a legend."""
-    look, shares = look_of(line.method), np.array([rate.share for rate in rates])
+    look, shares = look_of(line.label), np.array([rate.share for rate in rates])
     low = shares - np.array([rate.low for rate in rates])
     high = np.array([rate.high for rate in rates]) - shares
     style = {"color": look.color, "marker": look.marker, "linestyle": look.line if joined else "none"}

@@ -327,13 +327,22 @@ def test_metrics_of_successes_compare_pairs_in_which_both_succeeded(run):
     assert tests["stack", "L4", "replay", "clearance"].difference.pairs == 12
 
 
-def test_two_cells_of_one_method_are_told_apart(tmp_path):
+def test_two_cells_of_one_method_are_told_apart_and_compared(tmp_path):
     folder = small_run(tmp_path / "run", 3, levels=("L1",), methods=("screw",))
     cells = json.loads((folder / "cells.json").read_text())
-    other = {**cells[0], "digest": "ab" * 6, "settings": {"motion": {"guide": 0.2}}}
+    other = {**cells[0], "digest": "ab" * 6, "settings": {"motion": {"guide": 0.2}, "trim": 0.1}}
+    records, _ = read_records(folder / FILE)
     (folder / "cells.json").write_text(json.dumps([other, cells[0]]))
+    with (folder / FILE).open("ab") as file:
+        file.write(b"".join(encoded(replace(record, cell="ab" * 6, success=False)) for record in records))
     groups = groups_of(read_run(folder))
-    assert sorted(group.label for group in groups) == sorted(["screw (abab)", f"screw ({cells[0]['digest'][:4]})"])
+    assert [group.label for group in groups] == ["screw", "screw motion.guide=0.2 trim=0.1"]
+    (test,) = success_tests(groups, lambda record: record.success)
+    assert test.label == groups[1].label
+    assert test.only_other == 0
+    (folder / "cells.json").write_text(json.dumps([{**other, "settings": {}}, cells[0]]))
+    labels = {group.label for group in groups_of(read_run(folder))}
+    assert labels == {"screw (abab)", f"screw ({cells[0]['digest'][:4]})"}
 
 
 def test_a_method_looks_the_same_in_every_report():
