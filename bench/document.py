@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .comparison import Rate
+from .groups import Rate
 
 
 @dataclass(frozen=True, slots=True)

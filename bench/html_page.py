@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from .comparison import Rate
+from .groups import Rate
 from .document import Block, Bullets, Code, Document, Entry, Heading, Link, Paragraph, Pictures, Table, rate_words
 from .escaping import plain
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .comparison import Rate
+from .groups import Rate
 from .document import Block, Bullets, Code, Document, Entry, Heading, Link, Paragraph, Pictures, Table, rate_words
 from .escaping import markdown_text, plain
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .comparison import SAFE, UNSAFE, rank
+from .groups import SAFE, UNSAFE, rank
 from .figure_style import FAINT, INK, legend_above, new_figure
 from .methods import look_of
 from .rate_figures import COLUMNS, HEIGHT, Series, share_axis

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .comparison import ORDERED, Group, Rate, rank
+from .groups import ORDERED, Group, Rate, rank
 from .figure_style import legend_above, new_figure
 from .methods import look_of, place_of
-from .run_folder import Key
+from .run_reading import Key
 
 HEIGHT, COLUMNS = 2.2, 3
 """Of a figure without its legend [inch]; columns of the legend."""

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from ..planner.errors import BadConfig
 from . import report_tables as tables
-from .comparison import Group, groups_by_task, groups_of, metric_tests, success_tests
+from .groups import Group, groups_by_task, groups_of, metric_tests, success_tests
 from .document import Block, Bullets, Code, Document, Entry, Heading, Link, Paragraph, Table
 from .html_page import html_of
 from .markdown_page import markdown_of
 from .methods import REFERENCE
 from .metric_table import METRICS
 from .report_pictures import drawn, with_caption
-from .run_folder import Run, merged, read_run, results_hash
+from .run_reading import Run, merged, read_run, results_hash
 from .tables_csv import write_tables
 from .videos import videos_in
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .comparison import Group, groups_by_task
+from .groups import Group, groups_by_task
 from .document import Picture, Pictures
 from .escaping import slug
 from .figure_style import saved, styled
 from .outcome_figures import clearance, failures, timing
 from .rate_figures import Series, by_level, by_speed, series_of
-from .run_folder import Run
+from .run_reading import Run
 
 FOLDER = "figures"
 KINDS = ("success", "speed", "failures", "clearance", "timing")

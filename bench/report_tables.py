@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .comparison import (
+from .groups import (
     SAFE,
     UNSAFE,
     Group,

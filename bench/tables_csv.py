@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .comparison import Group, groups_of
+from .groups import Group, groups_of
 from .escaping import csv_text
 from .metric_table import METRICS
 from .records import EpisodeRecord
-from .run_folder import Run
+from .run_reading import Run
 from .statistics import interquartile_mean, median
 
 EPISODE_WORDS = ("cell", "task", "robot", "level", "method")

@@ -303,6 +303,6 @@ def test_every_metric_is_explained():
 
 
 def test_the_documentation_explains_every_metric():
-    text = (Path(__file__).parents[2] / "docs" / "comparison.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
     for metric in METRICS.values():
         assert f"| {metric.title} | {metric.meaning} | {metric.better or '–'} |" in text

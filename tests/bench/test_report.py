@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from example_runs import GOLDEN, changed, small_run, with_words
 
-from onedemo.bench.comparison import groups_of, metric_tests, success_tests
+from onedemo.bench.groups import groups_of, metric_tests, success_tests
 from onedemo.bench.escaping import csv_text, markdown_text, plain, slug
 from onedemo.bench.methods import LOOKS, look_of
 from onedemo.bench.records import FILE, encoded, read_records
 from onedemo.bench.report import write_report, write_report_of
 from onedemo.bench.report_tables import number, p_words
-from onedemo.bench.run_folder import merged, peak_speed, read_run, results_hash
+from onedemo.bench.run_reading import merged, peak_speed, read_run, results_hash
 from onedemo.bench.statistics import holm, mcnemar
 from onedemo.bench.videos import Video, chosen, video_of, videos_in
 from onedemo.planner.errors import BadConfig

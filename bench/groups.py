@@ -14,7 +14,7 @@ from .escaping import plain
 from .methods import REFERENCE, place_of
 from .metric_table import METRICS, Metric
 from .records import EpisodeRecord
-from .run_folder import Cell, Run
+from .run_reading import Cell, Run
 from .statistics import Difference, holm, mcnemar, paired_bootstrap, wilson
 from .tasks import TASKS
 
