@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..baselines.policy import Policy, PolicyReport
 from ..configs.schema import RunConfig
+from .clearance import solids_of
+from .likeness import demonstration_named
+from .metrics import metrics_of
 from .records import EpisodeRecord
 from .scenarios import Scenario
 from .statistics import median, quantile
+from .trace import TraceRecorder
 
 GRACE_SECONDS = 2.0
 """Time that the simulator gets to judge after a policy has declared that it is done."""
@@ -23,29 +28,76 @@ Observer = Callable[[Any, Any], None]
 
 
 def run_episode(
-    env: Any, policy: Policy, scenario: Scenario, config: RunConfig, observer: Observer | None = None
+    env: Any,
+    policy: Policy,
+    scenario: Scenario,
+    config: RunConfig,
+    observer: Observer | None = None,
+    trajectories: Path | None = None,
 ) -> tuple[EpisodeRecord, PolicyReport]:
-    """Run one scenario to its end; success is what the environment says at the end."""
-    started = time.perf_counter()
+    """Run one scenario to its end; success is what the environment says at the end.
+
+    Args:
+        env: the environment.
+        policy: who acts.
+        scenario: where it begins.
+        config: what the record says of the run.
+        observer: see `Observer`.
+        trajectories: folder into which the trace is written, as CELL-INDEX.npz; None: it is not kept.
+    """
+    started, recorder = time.perf_counter(), TraceRecorder(env)
     observation, info = env.reset(seed=scenario.seed, options={"level": scenario.level})
-    dt = env.unwrapped.control_dt
-    state, report, ticks, steps, grace = None, PolicyReport(), [], 0, round(GRACE_SECONDS / dt)
-    if observer:
-        observer(env, observation)
+    dt, arms = env.unwrapped.control_dt, len(env.unwrapped.arms)
+    state, report, ticks, first, grace = None, PolicyReport(), [], 0, round(GRACE_SECONDS / dt)
+    watch = _watching(recorder, observer)
+    watch(env, observation)
     over = False
     while not over and grace > 0:
         before = time.perf_counter()
         action, state = policy.predict(observation, state)
         ticks.append(time.perf_counter() - before)
+        first = first or (len(ticks) if np.reshape(action, (arms, -1))[:, :-1].any() else 0)
         observation, _, terminated, truncated, info = env.step(action)
-        over, steps = terminated or truncated, steps + 1
-        if observer:
-            observer(env, observation)
+        over = terminated or truncated
+        watch(env, observation)
         report = _report(policy, state)
         if report.done:
             grace = 0 if report.failure_reason else grace - 1
-    reason, detail = failure(info, report, dt * steps)
-    record = EpisodeRecord(
+    trace, numbers = recorder.trace(), numbers_of(info)
+    if trajectories is not None:
+        trace.save(trajectories / f"{config.digest()}-{scenario.index}.npz")
+    shown, success = demonstration_named(config.demonstration), bool(info["success"])
+    metrics = metrics_of(trace, solids_of(env.unwrapped.sim), config.task, numbers, shown, success=success)
+    times = [1e6 * value for value in (median(ticks), quantile(ticks, 0.99), max(ticks), sum(ticks[: first or None]))]
+    record = _record(config, scenario, info, report, dt * len(ticks), metrics, time.perf_counter() - started, times)
+    return record, report
+
+
+def _watching(recorder: TraceRecorder, observer: Observer | None) -> Observer:
+    """Both, one after the other."""
+
+    def watch(env: Any, observation: Any) -> None:
+        recorder(env, observation)
+        if observer:
+            observer(env, observation)
+
+    return watch
+
+
+def _record(
+    config: RunConfig,
+    scenario: Scenario,
+    info: dict[str, Any],
+    report: PolicyReport,
+    seconds: float,
+    metrics: dict[str, float | None],
+    wall_seconds: float,
+    tick_us: list[float],
+) -> EpisodeRecord:
+    reason, detail = failure(info, report, seconds)
+    clearance = float(info["min_obstacle_distance"])
+    return EpisodeRecord(
+        cell=config.digest(),
         index=scenario.index,
         seed=scenario.seed,
         method=config.method,
@@ -58,15 +110,15 @@ def run_episode(
         failure_reason=reason,
         detail=detail,
         collision=info["collision"],
-        seconds=round(dt * steps, 6),
+        seconds=round(seconds, 6),
         contacts=int(info["n_contacts"]),
-        clearance=clearance if np.isfinite(clearance := float(info["min_obstacle_distance"])) else None,
+        clearance=clearance if np.isfinite(clearance) else None,
         refused=int(info["layouts_refused"]),
         numbers=numbers_of(info),
-        wall_seconds=time.perf_counter() - started,
-        tick_us=[1e6 * value for value in (median(ticks), quantile(ticks, 0.99), max(ticks))],
+        metrics=metrics,
+        wall_seconds=wall_seconds,
+        tick_us=tick_us,
     )
-    return record, report
 
 
 def failure(info: dict[str, Any], report: PolicyReport, seconds: float) -> tuple[str, str]:
