@@ -18,7 +18,7 @@ from .metric_table import METRICS, Metric
 from .records import HUNG, EpisodeRecord
 from .run_reading import Run
 from .scenarios import place_of as drawn_from
-from .statistics import Difference, holm, mcnemar, paired_bootstrap, wilson
+from .statistics import FEWEST, Difference, holm, mcnemar, paired_bootstrap, wilson
 from .tasks import TASKS
 
 ORDERED = ("L0", "L1", "L2", "L3", "L4")
@@ -221,7 +221,7 @@ def success_tests(groups: list[Group], succeeded: Callable[[EpisodeRecord], bool
 
 
 def metric_tests(groups: list[Group]) -> list[MetricTest]:
-    """Every paired metric of every method against the reference, where both have it in at least two scenarios."""
+    """Every paired metric of every method against the reference, where both have it in at least `FEWEST` scenarios."""
     found: list[tuple[Setting, str, str, Difference]] = []
     for reference, other in _opponents(groups):
         pairs = _paired(reference, other)
@@ -232,7 +232,7 @@ def metric_tests(groups: list[Group]) -> list[MetricTest]:
                 if (a.success and b.success) or not metric.successes
             ]
             known = np.array([pair for pair in values if None not in pair], dtype=np.float64).reshape(-1, 2)
-            if metric.paired and len(known) > 1:
+            if metric.paired and len(known) >= FEWEST:
                 difference = paired_bootstrap(*(metric.factor * known.T))
                 found.append((other.setting, other.label, name, difference))
     adjusted = _adjusted([(f"{label} {name}", difference.p) for _, label, name, difference in found])

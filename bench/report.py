@@ -17,6 +17,7 @@ from .metric_table import METRICS
 from .report_pictures import drawn, with_caption
 from .run_folder import FIGURE, SHOWN, VIDEO, table_hash, written_json
 from .run_reading import Run, merged, read_run
+from .statistics import FEWEST
 from .summary import SUMMARY, summary_row, write_summary
 from .tables_csv import write_tables
 from .videos import FILMED, videos_in
@@ -29,9 +30,9 @@ TESTS = (
     "by the config before the first one ran."
 )
 DIFFERENCES = (
-    f"Means over pairs of scenarios, {REFERENCE} less the method, with studentized bootstrap 95 % intervals (seed 0). "
-    "A metric of successes compares pairs in which both succeeded. Holm's correction is over all tasks and levels of a "
-    "method and a metric."
+    f"Means over at least {FEWEST} pairs of scenarios, {REFERENCE} less the method, with studentized bootstrap 95 % "
+    "intervals (seed 0). A metric of successes compares pairs in which both succeeded. Holm's correction is over all "
+    "tasks and levels of a method and a metric."
 )
 
 

@@ -16,7 +16,7 @@ from .run_folder import read_cells, recorded
 from .scenarios import FILE as SCENARIOS
 from .scenarios import Suite, check_mergeable, read_suite
 
-MAX_BYTES = 2**20
+MAX_BYTES = 64 * 2**20
 """Of a description of a machine."""
 MOST_NOTES = 10
 """Lines about damaged files that are said one by one."""

@@ -77,8 +77,12 @@ class Difference(NamedTuple):
     pairs: int
 
 
+FEWEST = 8
+"""Pairs; fewer have too few different draws, some without any spread, whose scores mean nothing."""
+
+
 def paired_bootstrap(first: np.ndarray, second: np.ndarray, seed: int = 0) -> Difference:
-    """Mean difference of pairs (n,) with its interval by the studentized bootstrap; NaN of fewer than two pairs.
+    """Mean difference of pairs (n,) with its interval by the studentized bootstrap; NaN of fewer than `FEWEST`.
 
     Each draw takes n pairs with replacement and measures its mean in its own standard errors. The quantiles of that
     give the interval, and how often it is farther out than the sample's own mean the p-value, so that both tell the
@@ -86,7 +90,7 @@ def paired_bootstrap(first: np.ndarray, second: np.ndarray, seed: int = 0) -> Di
     """
     away = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     n = len(away)
-    if n < 2:
+    if n < FEWEST:
         return Difference(float(away.mean()) if n else math.nan, math.nan, math.nan, math.nan, n)
     mean, error = float(away.mean()), float(away.std(ddof=1)) / math.sqrt(n)
     if error <= 1e-12 * max(abs(mean), 1e-300):
@@ -97,7 +101,7 @@ def paired_bootstrap(first: np.ndarray, second: np.ndarray, seed: int = 0) -> Di
         drawn = away[rng.integers(n, size=(min(rows, RESAMPLES - start), n))]
         errors = drawn.std(axis=1, ddof=1) / math.sqrt(n)
         # a draw of equal pairs alone has no error of its own: it is given the sample's
-        parts.append((drawn.mean(axis=1) - mean) / np.where(errors > 0.0, errors, error))
+        parts.append((drawn.mean(axis=1) - mean) / np.where(errors > 1e-9 * error, errors, error))
     scores = np.concatenate(parts)
     low, high = np.quantile(scores, [0.025, 0.975])
     farther = int((np.abs(scores) >= abs(mean) / error).sum())

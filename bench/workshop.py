@@ -164,7 +164,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) ->
         ScenarioChanged: the environment draws another start than the frozen one.
         BadConfig: the start cannot be drawn.
     """
-    from .episode import run_episode
+    from .episode import judged, play
     from .starts import check_start, drawn_start
 
     scenario, started, checked = scenarios_of(config)[job["index"]], time.perf_counter(), False
@@ -177,7 +177,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) ->
 
     kept = Path(job["trajectories"]) if job.get("trajectories") else None
     try:
-        record, _ = run_episode(env, policy, scenario, config, observer, kept)
+        played = play(env, policy, scenario, observer)
     except ScenarioChanged:
         raise
     except Exception as error:
@@ -186,6 +186,8 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) ->
         LOG.info("%s, seed %d", config.method, scenario.seed, exc_info=True)
         detail = f"{type(error).__name__}: {error}"
         record = lost_record(config, scenario, ERROR, detail, time.perf_counter() - started)
+    else:
+        record = judged(env, played, scenario, config, kept)
     return replace(record, cell=config.digest(), scenario=job["scenario"])
 
 

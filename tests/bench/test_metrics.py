@@ -13,7 +13,7 @@ import pytest
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.bench.carries import carries, carrying_tilt, tilts
 from onedemo.bench.clearance import Solids
-from onedemo.bench.episode import run_episode
+from onedemo.bench.episode import judged, play, run_episode
 from onedemo.bench.likeness import FUMBLING, deviation, length_of, shown, turning_of, way_ratio
 from onedemo.bench.metric_table import METRICS
 from onedemo.bench.metrics import first_motion, metrics_of
@@ -275,7 +275,8 @@ class Idle:
 def test_an_episode_is_recorded_with_its_metrics_and_trace(stack, tmp_path):
     env = gym.make("onedemo/Stack-v0", level="L3", max_episode_steps=20)
     config = RunConfig(name="x", task="stack", method="idle", demonstration="stack", level="L3")
-    record, _ = run_episode(env, Idle(), Scenario(4, 9, "L3"), config, trajectories=tmp_path)
+    scenario = Scenario(4, 9, "L3")
+    record = judged(env, play(env, Idle(), scenario), scenario, config, tmp_path)
     again, _ = run_episode(env, Idle(), Scenario(4, 9, "L3"), config)
     assert record.cell == config.digest()
     assert record.metrics == again.metrics

@@ -47,6 +47,9 @@ def test_statistics_of_nothing_say_so():
     assert mcnemar(0, 0) == 1.0
     assert math.isnan(paired_bootstrap(np.zeros(0), np.zeros(0)).mean)
     assert math.isnan(paired_bootstrap(np.ones(1), np.zeros(1)).p)
+    few = paired_bootstrap(np.arange(7.0), np.zeros(7))
+    assert few.mean == 3.0
+    assert all(map(math.isnan, (few.low, few.high, few.p))), "pairs too few to say"
     assert all(map(math.isnan, hierarchical_bootstrap([])))
 
 
