@@ -36,7 +36,7 @@ def run(
     """Run the episodes of a config, a whole comparison or a single cell, and write a report.
 
     Keys of a cell: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
-    video, settings. Keys with dots reach into settings: settings.motion.guide=0.2
+    video, trajectories, settings. Keys with dots reach into settings: settings.motion.guide=0.2
 
     A comparison has lists of values under sweep, and may have defaults and exclude; a change of a swept key takes the
     place of its values. How it is run: executor (process, serial, ray), workers, address, wall_seconds.
@@ -56,6 +56,28 @@ def run(
     from .run import run_config
 
     raise typer.Exit(run_config(config, overrides or [], output, shard=shard, retry=retry, quiet=quiet))
+
+
+@app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of the same scenarios.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for it; default: the run folder, if there is one.")
+    ] = None,
+) -> None:
+    """Write the report of a run, or compare several: tables, paired tests, figures for a paper, CSV.
+
+    Reads the files of the run folders and runs nothing. report.html needs no server and nothing from elsewhere; its
+    figures are also there as PNG and PDF. The last line on standard output is the page.
+
+    Examples:
+    - onedemo report runs/stack-0123456789ab
+
+    - onedemo report runs/mine runs/theirs --output comparison
+    """
+    from .report_command import run_report
+
+    run_report(runs, output)
 
 
 @app.command()

@@ -108,13 +108,19 @@ class Comparison:
         writer = RecordWriter(self.folder / self.shard.file)
         try:
             with self.board.showing(self.mine(suite), records.values()):
-                for outcome in executor.results([_episode_job(suite, cell, index) for cell, index in todo]):
+                for outcome in executor.results([self._episode_job(suite, *each) for each in todo]):
                     record = self._record(outcome)
                     writer.append(record)
                     records[record.key] = record
                     self.board.add(record)
         finally:
             writer.close()
+
+    def _episode_job(self, suite: Suite, cell: RunConfig, index: int) -> Job:
+        scenario = suite.of(cell, index)
+        start = {"start": scenario["start"], "scenario": scenario["fingerprint"]}
+        kept = str((self.folder / "trajectories").resolve()) if cell.trajectories else None
+        return {"kind": "episode", "cell": cell.model_dump(mode="json"), "index": index, **start, "trajectories": kept}
 
     def _record(self, outcome: Outcome) -> EpisodeRecord:
         """The record of an episode, also of one that its worker did not survive twice."""
@@ -153,12 +159,6 @@ class Comparison:
         if len(self.grid.cells) > 1:
             reason = f"{reason} (in the cell {self.grid.label(config)}); `exclude:` leaves combinations out"
         return BadConfig(self.grid.blame(full), full, reason)
-
-
-def _episode_job(suite: Suite, cell: RunConfig, index: int) -> Job:
-    scenario = suite.of(cell, index)
-    start = {"start": scenario["start"], "scenario": scenario["fingerprint"]}
-    return {"kind": "episode", "cell": cell.model_dump(mode="json"), "index": index, **start}
 
 
 def _chunks(indices: range) -> Iterator[list[int]]:

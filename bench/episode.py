@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..baselines.policy import Policy, PolicyReport
 from ..configs.schema import RunConfig
+from .clearance import solids_of
+from .likeness import demonstration_named
+from .metrics import metrics_of
 from .records import EpisodeRecord
 from .scenarios import Scenario
 from .statistics import median, quantile
+from .trace import Trace, TraceRecorder
 
 GRACE_SECONDS = 2.0
 """Time that the simulator gets to judge after a policy has declared that it is done."""
@@ -22,51 +28,120 @@ Observer = Callable[[Any, Any], None]
 """Called with the environment and the observation at the start and after every step."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    """An episode that has come to its end and is yet to be judged.
+
+    Attributes:
+        trace: what was measured.
+        info: the environment's last.
+        report: the policy's last.
+        ticks: real time of the policy in each tick [s].
+        first: how many ticks there were until an action moved something; 0: none did.
+        begun: when it began [s], by `time.perf_counter`.
+    """
+
+    trace: Trace
+    info: dict[str, Any]
+    report: PolicyReport
+    ticks: list[float]
+    first: int
+    begun: float
+
+
 def run_episode(
     env: Any, policy: Policy, scenario: Scenario, config: RunConfig, observer: Observer | None = None
 ) -> tuple[EpisodeRecord, PolicyReport]:
     """Run one scenario to its end; success is what the environment says at the end."""
-    started = time.perf_counter()
+    played = play(env, policy, scenario, observer)
+    return judged(env, played, scenario, config), played.report
+
+
+def play(env: Any, policy: Policy, scenario: Scenario, observer: Observer | None = None) -> Played:
+    """Let a policy act in a scenario until it is over; raises what the policy raises.
+
+    Args:
+        env: the environment.
+        policy: who acts.
+        scenario: where it begins.
+        observer: see `Observer`.
+    """
+    begun, recorder = time.perf_counter(), TraceRecorder(env)
     observation, info = env.reset(seed=scenario.seed, options={"level": scenario.level})
-    dt = env.unwrapped.control_dt
-    state, report, ticks, steps, grace = None, PolicyReport(), [], 0, round(GRACE_SECONDS / dt)
-    if observer:
-        observer(env, observation)
+    dt, arms = env.unwrapped.control_dt, len(env.unwrapped.arms)
+    state, report, ticks, first, grace = None, PolicyReport(), [], 0, round(GRACE_SECONDS / dt)
+    watch = _watching(recorder, observer)
+    watch(env, observation)
     over = False
     while not over and grace > 0:
         before = time.perf_counter()
         action, state = policy.predict(observation, state)
         ticks.append(time.perf_counter() - before)
+        first = first or (len(ticks) if np.reshape(action, (arms, -1))[:, :-1].any() else 0)
         observation, _, terminated, truncated, info = env.step(action)
-        over, steps = terminated or truncated, steps + 1
-        if observer:
-            observer(env, observation)
+        over = terminated or truncated
+        watch(env, observation)
         report = _report(policy, state)
         if report.done:
             grace = 0 if report.failure_reason else grace - 1
-    reason, detail = failure(info, report, dt * steps)
-    record = EpisodeRecord(
+    return Played(recorder.trace(), info, report, ticks, first, begun)
+
+
+def _watching(recorder: TraceRecorder, observer: Observer | None) -> Observer:
+    """Both, one after the other."""
+
+    def watch(env: Any, observation: Any) -> None:
+        recorder(env, observation)
+        if observer:
+            observer(env, observation)
+
+    return watch
+
+
+def judged(
+    env: Any, played: Played, scenario: Scenario, config: RunConfig, trajectories: Path | None = None
+) -> EpisodeRecord:
+    """The record of an episode.
+
+    Args:
+        env: the environment that it was played in.
+        played: how it went.
+        scenario: where it began.
+        config: what the record says of the run.
+        trajectories: folder into which the trace is written, as CELL-INDEX.npz; None: it is not kept.
+    """
+    info, numbers, success = played.info, numbers_of(played.info), bool(played.info["success"])
+    if trajectories is not None:
+        played.trace.save(trajectories / f"{config.digest()}-{scenario.index}.npz")
+    shown, solids = demonstration_named(config.demonstration), solids_of(env.unwrapped.sim)
+    metrics = metrics_of(played.trace, solids, config.task, numbers, shown, success=success)
+    seconds = env.unwrapped.control_dt * len(played.ticks)
+    reason, detail = failure(info, played.report, seconds)
+    clearance, ticks = float(info["min_obstacle_distance"]), played.ticks
+    times = (median(ticks), quantile(ticks, 0.99), max(ticks), sum(ticks[: played.first or None]))
+    return EpisodeRecord(
+        cell=config.digest(),
         index=scenario.index,
         seed=scenario.seed,
         method=config.method,
         task=config.task,
         robot=config.robot,
         level=scenario.level,
-        success=bool(info["success"]),
+        success=success,
         safe=bool(info["safe"]),
         stage=info["stage"],
         failure_reason=reason,
         detail=detail,
         collision=info["collision"],
-        seconds=round(dt * steps, 6),
+        seconds=round(seconds, 6),
         contacts=int(info["n_contacts"]),
-        clearance=clearance if np.isfinite(clearance := float(info["min_obstacle_distance"])) else None,
+        clearance=clearance if np.isfinite(clearance) else None,
         refused=int(info["layouts_refused"]),
-        numbers=numbers_of(info),
-        wall_seconds=time.perf_counter() - started,
-        tick_us=[1e6 * value for value in (median(ticks), quantile(ticks, 0.99), max(ticks))],
+        numbers=numbers,
+        metrics=metrics,
+        wall_seconds=time.perf_counter() - played.begun,
+        tick_us=[1e6 * value for value in times],
     )
-    return record, report
 
 
 def failure(info: dict[str, Any], report: PolicyReport, seconds: float) -> tuple[str, str]:

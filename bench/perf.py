@@ -20,6 +20,7 @@ from .console import check_writable, console, labeled, writing
 from .measuring import Row, row, seconds_per_call
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
 from .perf_planner import LINES
+from .perf_report import REPORT_LINES
 from .perf_runs import RUN_LINES
 from .perf_tasks import TASK_LINES, started
 
@@ -151,6 +152,7 @@ GROUPS: dict[str, Lines] = {
     "step": {**TASK_LINES, PEER_STEP: _peer_step},
     "run": RUN_LINES,
     "process": {MEMORY: _memory, IMPORT: _import, START: _start, HELP: _help},
+    "report": REPORT_LINES,
 }
 """Per group its lines: what is measured, and how."""
 

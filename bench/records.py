@@ -8,7 +8,7 @@ import os
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any
 
@@ -55,10 +55,11 @@ class EpisodeRecord:
         refused: starts that were drawn and had no room for the obstacles.
         numbers: the task's own, as in `info`, each a list.
         wall_seconds: real time; not part of the result.
-        tick_us: median, 99th percentile and largest time of the policy per tick [us]; not part of the result.
-            Zeros where the episode was lost with its worker.
+        tick_us: median, 99th percentile and largest time of the policy per tick, and its time until the first action
+            that moves something [us]; not part of the result. Zeros where the episode was lost with its worker.
         cell: digest of the cell's config.
         scenario: fingerprint of the scenario.
+        metrics: see `metric_table`; None where there was nothing to measure.
     """
 
     index: int
@@ -82,6 +83,7 @@ class EpisodeRecord:
     tick_us: list[float]
     cell: str = ""
     scenario: str = ""
+    metrics: dict[str, float | None] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[str, int]:
@@ -105,8 +107,8 @@ def known_record(values: dict[str, Any]) -> EpisodeRecord:
     Raises:
         ValueError: a key that no record has, or one that every record has is missing.
     """
-    names = {field.name for field in fields(EpisodeRecord)}
-    needed = {field.name for field in fields(EpisodeRecord) if field.default is field.default_factory is MISSING}
+    names = {each.name for each in fields(EpisodeRecord)}
+    needed = {each.name for each in fields(EpisodeRecord) if each.default is each.default_factory is MISSING}
     if not needed <= set(values) <= names:
         raise ValueError(f"not the keys of a record: {sorted(set(values) ^ names)}")
     return EpisodeRecord(**values)

@@ -1,169 +1,227 @@
-"""What a run says: one row of numbers, and a report that can be read on its own."""
+"""`report.md`, `report.html`, figures and tables of run folders; what is read is their files, nothing is run."""
 
 from __future__ import annotations
 
-import json
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from ..configs.schema import RunConfig
-from .records import EpisodeRecord
-from .statistics import median, wilson
-from .tasks import TASKS
+from ..planner.errors import BadConfig
+from . import report_tables as tables
+from .document import Block, Bullets, Code, Document, Heading, Link, Paragraph, Picture, Pictures, Table
+from .files import write_whole
+from .groups import UNSAFE, Group, groups_by_task, groups_of, metric_tests, success_tests
+from .html_page import html_of
+from .markdown_page import markdown_of
+from .methods import REFERENCE
+from .metric_table import METRICS
+from .report_pictures import drawn, with_caption
+from .run_folder import FIGURE, SHOWN, VIDEO, table_hash, written_json
+from .run_reading import Run, merged, read_run
+from .statistics import FEWEST
+from .summary import SUMMARY, summary_row, write_summary
+from .tables_csv import write_tables
+from .videos import FILMED, videos_in
+
+INTERVALS = "Whiskers and brackets are Wilson 95 % intervals of single cells; nothing is pooled over levels."
+TESTS = (
+    f"Every method against {REFERENCE} on the scenarios that both have run: the same starts, goals, obstacles and "
+    f"seeds. A : B means that in A pairs {REFERENCE} alone succeeded and in B the method alone; p is of the exact "
+    "McNemar test, after Holm's correction over all tasks and levels of the method. The number of episodes was fixed "
+    "by the config before the first one ran."
+)
+DIFFERENCES = (
+    f"Means over at least {FEWEST} pairs of scenarios, {REFERENCE} less the method, with studentized bootstrap 95 % "
+    "intervals (seed 0). A metric of successes compares pairs in which both succeeded. Holm's correction is over all "
+    "tasks and levels of a method and a metric."
+)
 
 
-def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
-    """The numbers of one cell: method, task, robot, level and what came of it; None where there is nothing to tell."""
-    successes = sum(record.success for record in records)
-    low, high = wilson(successes, len(records))
-    error = TASKS[config.task].error
-    worst = [error.factor * max(record.numbers[error.key]) for record in records if record.success]
-    clearances = [1e3 * record.clearance for record in records if record.clearance is not None]
-    return {
-        "method": config.method,
-        "task": config.task,
-        "robot": config.robot,
-        "level": config.level,
-        "episodes": len(records),
-        "successes": successes,
-        "safe_successes": sum(record.safe_success for record in records),
-        "wilson_low": round(low, 4),
-        "wilson_high": round(high, 4),
-        **_middle_and_most("seconds", [record.seconds for record in records]),
-        "error": f"{error.words} [{error.unit}]",
-        **_middle_and_most("error", worst),
-        **_middle_and_most("tick_us", [record.tick_us[0] for record in records]),
-        "tick_us_p99": _middle([record.tick_us[1] for record in records]),
-        "tick_us_max": max((record.tick_us[2] for record in records), default=None),
-        "touching": sum(record.contacts > 0 for record in records),
-        "clearance_mm_min": min(clearances, default=None),
-        "refused": sum(record.refused for record in records),
-        "failures": dict(Counter(record.failure_reason for record in records if not record.success)),
-    }
+def write_report(folder: Path) -> list[Path]:
+    """The report of one run folder, written into it; the files written, the report itself first.
+
+    Raises:
+        BadConfig: the folder is none, or a file in it cannot be read.
+    """
+    return write_report_of([folder], folder)
 
 
-def _middle(values: list[float]) -> float | None:
-    return median(values) if values else None
+def write_report_of(folders: list[Path], output: Path) -> list[Path]:
+    """The report of several run folders of the same scenarios as one; the files written, the report itself first.
+
+    Raises:
+        BadConfig: a folder cannot be used, they do not belong together, or nothing can be written.
+    """
+    run = merged([read_run(folder) for folder in folders])
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        document = _document(run, output)
+        files = [output / "report.md", output / "report.html"]
+        for file, text in zip(files, (markdown_of(document), html_of(document)), strict=True):
+            write_whole(file, text)
+        write_summary(output / SUMMARY, _rows(run))
+        return [*files, output / SUMMARY, *write_tables(run, output)]
+    except OSError as error:
+        raise BadConfig(output, "", f"no report can be written: {error.strerror or error}") from None
 
 
-def _middle_and_most(key: str, values: list[float]) -> dict[str, float | None]:
-    return {f"{key}_median": _middle(values), f"{key}_max": max(values, default=None)}
-
-
-def verdict(row: dict[str, Any]) -> list[str]:
-    """Lines for the terminal and the top of the report."""
-    failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
-    times = f"{_said(row['tick_us_median'], '.0f')} us per tick (median), {_said(row['tick_us_p99'], '.0f')} us (p99)"
-    what, _, unit = row["error"].rpartition(" [")
-    most = row["error_max"]
-    largest = "no success, so no error" if most is None else f"{what} {most:.1f} {unit[:-1]} in the successes"
+def _rows(run: Run) -> list[dict[str, Any]]:
+    """A row of `summary.json` for each cell."""
     return [
-        f"{row['successes']} of {row['episodes']} succeeded at {row['level']} "
-        f"(Wilson 95 %: {row['wilson_low']:.2f} to {row['wilson_high']:.2f}), "
-        f"{row['safe_successes']} without any unwanted contact",
-        f"{_said(row['seconds_median'])} s simulated per episode (median), {largest}",
-        f"planner {times}; failures: {failures}",
-        *_beside_obstacles(row),
+        {**summary_row(cell, run.records[digest]), "cell": digest, "label": run.labels[digest]}
+        for digest, cell in run.cells.items()
     ]
 
 
-def _beside_obstacles(row: dict[str, Any]) -> list[str]:
-    """A line about obstacles, if there were any."""
-    if row["clearance_mm_min"] is None and not row["refused"]:
+def _document(run: Run, output: Path) -> Document:
+    groups = groups_of(run)
+    pictures = drawn(run, groups, output)
+    shown = {kind: with_caption(found, CAPTIONS[kind]) for kind, found in pictures.items()}
+    names = list(dict.fromkeys(cell.name for cell in run.cells.values()))
+    cells, episodes = len(groups), sum(len(group.records) for group in groups)
+    document = Document(f"{', '.join(names)}: {_counted(cells, 'cell')}, {_counted(episodes, 'episode')}")
+    document.blocks += [
+        *_opening(run, groups),
+        Heading(2, "Safe success"),
+        tables.headline(groups, lambda group: group.safe_success),
+        *shown["success"],
+        Heading(2, "Success"),
+        tables.headline(groups, lambda group: group.success),
+        tables.counts(groups),
+        *_tests(groups),
+        *([Heading(2, "Success against the speed of obstacles"), *shown["speed"]] if shown["speed"] else []),
+        Heading(2, "Failures"),
+        *shown["failures"],
+        *_failures(groups, output),
+        Heading(2, "Quality of motion"),
+        *_metrics(groups),
+        *shown["clearance"],
+        Heading(2, "Planner time"),
+        tables.timing(groups),
+        *shown["timing"],
+        Heading(2, "What each method needs"),
+        tables.costs(groups),
+        *_first_episode(output),
+        *_repeating(run),
+    ]
+    return document
+
+
+def _first_episode(output: Path) -> list[Block]:
+    """Figure and video of the first episode, where a run has made them, or why there are none."""
+    shown = written_json(output, SHOWN)
+    if not shown:
         return []
-    drawn = row["episodes"] + row["refused"]
+    blocks: list[Block] = [Heading(2, "The first episode")]
+    if (output / FIGURE).is_file():
+        picture = Picture(FIGURE, (output / FIGURE).read_bytes(), "demonstration, final and executed paths", "png")
+        blocks.append(Pictures([picture], PATHS))
+    if (output / VIDEO).is_file() and not shown.get("video_problem"):
+        speed = f"{shown.get('speed', 1.0):.0f} times as fast as the simulation"
+        blocks.append(Table(["what", "file"], [[f"the episode, {speed}", Link(VIDEO, VIDEO)]]))
+    problems = {"figure": shown.get("figure_problem"), "video": shown.get("video_problem")}
+    missing = [f"No {what}: {problem}." for what, problem in problems.items() if problem]
+    return [*blocks, Bullets(missing)] if missing else blocks
+
+
+def _counted(count: int, word: str) -> str:
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
+PATHS = "Blue: the demonstration where it was given. Magenta: the final paths. Dashed: the executed path."
+CAPTIONS = {
+    "success": f"Safe success (success without any unwanted contact) by level. {INTERVALS}",
+    "speed": "Safe success of all episodes with obstacles against the largest speed of any of them in the scenario, "
+    "with Wilson 95 % intervals.",
+    "failures": "How the episodes of each cell ended, by the taxonomy of the tasks.",
+    "clearance": "Distribution of the smallest clearance of robot and held object over all episodes with obstacles.",
+    "timing": "Time of the policy per tick over all levels: median and 99th percentile (medians over episodes), "
+    "and the longest of all.",
+}
+
+
+def _opening(run: Run, groups: list[Group]) -> list[Block]:
+    missing = sum(max(0, group.planned - len(group.records)) for group in groups)
+    cells = list(run.cells.values())
+    words = {"tasks": [c.task for c in cells], "levels": [c.level for c in cells], "methods": [g.label for g in groups]}
+    items = [
+        *(f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in words.items()),
+        "Success is judged by the simulator; safe success is success without any unwanted contact.",
+        f"Scenarios: {run.suite.summary()}.",
+        *([f"Unfinished: {missing} of the planned episodes are missing."] if missing else []),
+        *run.warnings,
+    ]
+    return [Bullets(items)]
+
+
+def _tests(groups: list[Group]) -> list[Block]:
+    safe = success_tests(groups, lambda record: record.safe_success)
+    if not safe:
+        return []
+    plain = success_tests(groups, lambda record: record.success)
+    tests = [Heading(3, "Safe success"), tables.success_tests(groups, safe)]
+    tests += [Heading(3, "Success"), tables.success_tests(groups, plain)]
+    return [Heading(2, f"Paired tests against {REFERENCE}"), Paragraph(TESTS), *tests]
+
+
+def _failures(groups: list[Group], output: Path) -> list[Block]:
+    films = videos_in(output)
+    table = tables.failures(groups, films)
+    problems = dict.fromkeys(problem for problem in written_json(output, FILMED).values() if problem)
+    missing = [Bullets([f"Failures without a video: {problem}." for problem in problems])] if problems else []
+    every = [tables.every_failure(groups, films)] if table.rows and len(groups) == 1 else []
+    unsafe = [tables.unsafe_successes(groups)] if any(group.outcomes[UNSAFE] for group in groups) else []
+    return [table if table.rows else Paragraph("None."), *missing, *every, *unsafe]
+
+
+def _metrics(groups: list[Group]) -> list[Block]:
+    blocks: list[Block] = []
+    used: list[str] = []
+    for (task, _), some in groups_by_task(groups).items():
+        names = tables.known_metrics(some)
+        if names:
+            main = [name for name in names if METRICS[name].paired]
+            blocks += [Heading(3, task), tables.metrics(some, main)] if main else []
+            blocks += [tables.metrics(some, names, f"All metrics of {task}")] if names != main else []
+            used += names
+    if not blocks:
+        return [Paragraph("No episode has any metric.")]
+    tests = metric_tests(groups)
+    said = Paragraph(
+        "Interquartile means over episodes; those of lengths, times, errors and smoothness over successes."
+    )
+    meanings = [f"{m.words}: {m.meaning}{_better(m.better)}" for name, m in METRICS.items() if name in used]
+    differences = (
+        [Heading(3, "Paired differences"), Paragraph(DIFFERENCES), tables.metric_tests(groups, tests)] if tests else []
+    )
+    return [said, *blocks, Bullets(meanings), *differences]
+
+
+def _better(better: str) -> str:
+    return f" ({better} is better)" if better else ""
+
+
+def _repeating(run: Run) -> list[Block]:
+    environment = {key: value for key, value in run.environment.items() if key not in ("packages", "command")}
+    packages = run.environment.get("packages")
+    versions = (
+        ", ".join(f"{name} {version}" for name, version in packages.items()) if isinstance(packages, dict) else ""
+    )
+    folders = [folder.name for folder in run.folders]
+    again = [f"onedemo report {' '.join(folders)} --output comparison"] if len(folders) > 1 else []
+    command = run.command or "\n".join([*(f"onedemo run {name}/config.yaml" for name in folders), *again])
     return [
-        f"obstacles touched in {row['touching']} of {row['episodes']} episodes, smallest distance "
-        f"{_said(row['clearance_mm_min'])} mm; {row['refused']} of {drawn} starts had no room for them"
+        Heading(2, "How to repeat it"),
+        Code(command),
+        Bullets(
+            [
+                f"hash of the scenarios: {run.suite.hash}",
+                f"hash of the results, times left out, the same for any executor: {table_hash(run.every)}",
+                *(f"{key}: {value}" for key, value in environment.items()),
+                *([f"versions: {versions}"] if versions else []),
+            ]
+        ),
+        Paragraph(
+            "Every episode is in episodes.jsonl and episodes.csv, every cell in summary.csv and summary.json, the "
+            "whole config in config.yaml, starts and obstacles in scenarios.json; figures are there as PNG and PDF."
+        ),
     ]
-
-
-def write_summary(path: Path, rows: list[dict[str, Any]]) -> None:
-    """The rows as `{"rows": [...]}`."""
-    path.write_text(json.dumps({"rows": rows}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def _said(value: float | None, digits: str = ".1f") -> str:
-    return "-" if value is None else f"{value:{digits}}"
-
-
-def report_text(
-    config: RunConfig, records: list[EpisodeRecord], row: dict[str, Any], notes: list[str], command: str
-) -> str:
-    """The report as Markdown."""
-    parts = [
-        f"# {config.name}: {config.method} on {config.task}, {config.robot}, {config.level}",
-        "\n".join(f"- {line}" for line in verdict(row)),
-        _table(row),
-        _failures([record for record in records if not record.success], config),
-        _unsafe([record for record in records if record.success and not record.safe]),
-        "## Stage reached\n\n" + _stages(records),
-        "## Planner time\n\n" + _times(records),
-        "## One episode\n\n" + "\n\n".join(notes),
-        f"## How to repeat it\n\n```\n{command}\n```\n\n"
-        "Versions are in `environment.json`, the whole config in `config.yaml`, every episode in `episodes.jsonl`.",
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def _table(row: dict[str, Any]) -> str:
-    head = "| method | task | robot | level | episodes | success | safe success | Wilson 95 % | time [s] | error |"
-    line = "|---|---|---|---|---|---|---|---|---|---|"
-    cells = (
-        row["method"],
-        row["task"],
-        row["robot"],
-        row["level"],
-        row["episodes"],
-        row["successes"],
-        row["safe_successes"],
-        f"{row['wilson_low']:.2f} to {row['wilson_high']:.2f}",
-        f"{_said(row['seconds_median'])} (max {_said(row['seconds_max'])})",
-        "no success"
-        if not row["successes"]
-        else f"{row['error']} {_said(row['error_median'])} (max {_said(row['error_max'])})",
-    )
-    return "\n".join([head, line, "| " + " | ".join(_cell(cell) for cell in cells) + " |"])
-
-
-def _failures(records: list[EpisodeRecord], config: RunConfig) -> str:
-    if not records:
-        return "## Failures\n\nNone."
-    rows = ["| scenario | seed | reason | stage | explanation |", "|---|---|---|---|---|"]
-    for record in records:
-        cells = (record.index, record.seed, record.failure_reason, record.stage, record.detail)
-        rows.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
-    again = f"To see one: `onedemo run {config.name} seed=SEED episodes=1 level={config.level}`."
-    return "## Failures\n\n" + "\n".join(rows) + "\n\n" + again
-
-
-def _unsafe(records: list[EpisodeRecord]) -> str:
-    if not records:
-        return ""
-    lines = [f"- seed {record.seed}: {_cell(record.collision)}" for record in records]
-    return "## Successes with an unwanted contact\n\n" + "\n".join(lines)
-
-
-def _stages(records: list[EpisodeRecord]) -> str:
-    counts = Counter(record.stage for record in records)
-    return "\n".join(f"- {_cell(stage)}: {count}" for stage, count in counts.most_common())
-
-
-def _times(records: list[EpisodeRecord]) -> str:
-    median_us, p99, largest = zip(*(record.tick_us for record in records), strict=True)
-    rate = median([record.seconds / record.wall_seconds for record in records])
-    return (
-        f"Per tick of 20 ms, as called from Python: median {median(median_us):.0f} us, 99th percentile "
-        f"{median(p99):.0f} us (medians over episodes); the longest tick {max(largest) / 1e3:.1f} ms, in which "
-        f"a motion is planned with all its symmetric goals. An episode runs {rate:.0f} times faster than real time, "
-        "physics included."
-    )
-
-
-def _cell(value: Any) -> str:
-    """Text that can neither break a table nor become markup."""
-    text = " ".join(str(value).split())
-    for character in "\\|<>[]`*":
-        text = text.replace(character, f"\\{character}")
-    return text[:300]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 from contextlib import ExitStack
@@ -16,20 +15,17 @@ from .board import Board
 from .checks import check_grid
 from .comparison import Comparison
 from .console import console, labeled
-from .dispatch import Executor
 from .executors import executor_for
-from .files import write_whole
+from .finishing import film, report, show
 from .run_folder import (
     LOG,
-    WHOLE,
+    alone,
     describe,
     merge,
     open_folder,
     parsed_shard,
     recorded,
-    written_json,
 )
-from .run_report import SHOWN, write_report
 from .scenarios import read_suite
 
 DISK_FULL, INTERRUPTED = 3, 130
@@ -100,29 +96,20 @@ def _completed(comparison: Comparison, err: Any) -> list[str]:
     episodes = sum(cell.episodes for cell in grid.cells)
     with executor_for(grid.settings, episodes, folder / LOG) as executor:
         comparison.complete(executor)
-        if shard == WHOLE and len(grid.cells) == 1:
-            _show(executor, comparison, err)
-    suite = read_suite(folder)
-    assert suite
-    # other parts may have been finished meanwhile
-    records, _ = recorded(folder, grid.cells, suite)
-    missing = sum(len(suite.feasible(cell)) for cell in grid.cells) - len(records)
-    if missing:
-        return [f"part {shard.index} of {shard.count} is done; {missing} episodes of other parts are missing"]
+        suite = read_suite(folder)
+        assert suite
+        # other parts may have been finished meanwhile
+        records, _ = recorded(folder, grid.cells, suite)
+        missing = sum(len(suite.feasible(cell)) for cell in grid.cells) - len(records)
+        if missing:
+            return [f"part {shard.index} of {shard.count} is done; {missing} episodes of other parts are missing"]
+        with alone(folder, "pictures"):
+            if len(grid.cells) == 1:
+                with err.status("drawing the first episode"):
+                    show(executor, grid, folder)
+            if grid.cells[0].video:
+                with err.status("recording failures"):
+                    film(executor, grid, folder, records.values())
     merge(folder, records.values(), list(grid.cells))
-    return write_report(folder)
-
-
-def _show(executor: Executor, comparison: Comparison, err: Any) -> None:
-    """Figure and video of the first episode, unless they are there."""
-    folder, (cell,) = comparison.folder, comparison.grid.cells
-    before = written_json(folder, SHOWN)
-    if before and (before["video"] or not cell.video):
-        return
-    job = {"kind": "show", "cell": cell.model_dump(mode="json"), "folder": str(folder.resolve())}
-    with err.status("drawing the first episode"):
-        for outcome in executor.results([job]):
-            answer = outcome.answer or {"video": cell.video, "figure_problem": f"the worker: {outcome.lost}"}
-            if "crash" in answer or "refused" in answer:
-                answer = {"video": cell.video, "figure_problem": answer.get("crash") or answer["refused"]}
-            write_whole(folder / SHOWN, json.dumps(answer) + "\n")
+    with err.status("drawing the report"):
+        return report(folder)

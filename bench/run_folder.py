@@ -8,6 +8,9 @@
 | `scenarios.json` | the frozen starts, see `scenarios.Suite` |
 | `episodes.jsonl` | a line for each finished episode, appended; of part i of n: `episodes.i-of-n.jsonl` |
 | `workers.log` | what worker processes said |
+| `trajectories/` | with `trajectories: true`: what was measured at every tick, CELL-INDEX.npz, see `trace.Trace` |
+| `showcase.json` | what became of figure and video of the first episode of a run of one cell |
+| `videos/`, `videos.json` | with `video: true`: failures, see `videos.chosen`; why there is none |
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from .records import FILE, EpisodeRecord, RunBusy, encoded, locked, read_lines, 
 from .scenarios import Suite, read_suite
 
 CELLS, LOG = "cells.json", "workers.log"
+SHOWN, FIGURE, VIDEO = "showcase.json", "episode0.png", "episode0.mp4"
 VERSION = 1
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 PARTS = "episodes.*-of-*.jsonl"

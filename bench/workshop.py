@@ -6,8 +6,9 @@ A job and its answer are mappings that JSON can hold, so that any process may do
 |---|---|---|
 | "prepare" | | {} |
 | "draw" | "indices" | "drawn": per index a start, or why there is none |
-| "episode" | "index", "start", "scenario" | "record" |
+| "episode" | "index", "start", "scenario", "trajectories" (a folder or null) | "record" |
 | "show" | "folder" | what `show` returns |
+| "film" | "folder", "record" | "problem": why there is no video of it, or "" |
 
 What the user got wrong, or must know, is answered by {"refused": text, "key": key}.
 """
@@ -24,7 +25,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..configs.cell import RunConfig
 from ..planner.errors import BadConfig, BadOption, NoRoom, OneDemoError
-from .records import ERROR, EpisodeRecord
+from .records import ERROR, EpisodeRecord, known_record
+from .run_folder import FIGURE, VIDEO
 from .scenarios import Scenario, ScenarioChanged, scenarios_of
 from .tasks import TASKS
 
@@ -63,6 +65,8 @@ class Bench:
                 return {"record": asdict(episode(env, policy, config, job))}
             if job["kind"] == "show":
                 return shown(policy, config, Path(job["folder"]))
+            if job["kind"] == "film":
+                return {"problem": filmed(policy, config, known_record(job["record"]), Path(job["folder"]))}
             return {}
         except OneDemoError as error:
             return refusal(error)
@@ -160,7 +164,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) ->
         ScenarioChanged: the environment draws another start than the frozen one.
         BadConfig: the start cannot be drawn.
     """
-    from .episode import run_episode
+    from .episode import judged, play
     from .starts import check_start, drawn_start
 
     scenario, started, checked = scenarios_of(config)[job["index"]], time.perf_counter(), False
@@ -171,8 +175,9 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) ->
             checked = True
             check_start(scenario, job["start"], drawn_start(env, observation))
 
+    kept = Path(job["trajectories"]) if job.get("trajectories") else None
     try:
-        record, _ = run_episode(env, policy, scenario, config, observer)
+        played = play(env, policy, scenario, observer)
     except ScenarioChanged:
         raise
     except Exception as error:
@@ -181,6 +186,8 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: dict[str, Any]) ->
         LOG.info("%s, seed %d", config.method, scenario.seed, exc_info=True)
         detail = f"{type(error).__name__}: {error}"
         record = lost_record(config, scenario, ERROR, detail, time.perf_counter() - started)
+    else:
+        record = judged(env, played, scenario, config, kept)
     return replace(record, cell=config.digest(), scenario=job["scenario"])
 
 
@@ -205,7 +212,7 @@ def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str,
         refused=0,
         numbers={},
         wall_seconds=seconds,
-        tick_us=[0.0, 0.0, 0.0],
+        tick_us=[0.0, 0.0, 0.0, 0.0],
         cell=config.digest(),
     )
 
@@ -224,7 +231,7 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
     from .figures import draw_episode
     from .showcase import watch
 
-    figure, video = folder / "episode0.png", folder / "episode0.mp4"
+    figure, video = folder / FIGURE, folder / VIDEO
     env = made(config, "rgb_array" if config.video else None)
     try:
         seen = watch(env, policy, scenarios_of(config)[0], config, video if config.video else None)
@@ -235,3 +242,17 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
     title = f"{where}, seed {config.seed}: one demonstration, {config.method}"
     draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
     return {"speed": seen.speed, "video": config.video, "video_problem": seen.video_problem}
+
+
+def filmed(policy: Policy, config: RunConfig, record: EpisodeRecord, folder: Path) -> str:
+    """Record an episode once more into a run folder; "" or why there is no video."""
+    from .failure_videos import record_video
+
+    env = made(config, "rgb_array")
+    try:
+        return record_video(env, policy, record, config, folder)
+    except Exception as error:
+        LOG.info("no video", exc_info=True)
+        return f"{type(error).__name__}: {error}"
+    finally:
+        env.close()

@@ -13,7 +13,7 @@ STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 Values = Annotated[list[Any], Field(min_length=1, max_length=1000)]
 Condition = Annotated[dict[str, Any], Field(min_length=1)]
-BESIDE = ("name", "video", "episodes")
+BESIDE = ("name", "video", "trajectories", "episodes")
 """Keys that do not decide how an episode goes."""
 
 
@@ -38,7 +38,8 @@ class RunConfig(BaseModel):
         obstacles: their kind; None: what the level says.
         env: more arguments of the environment, like `n_blocks` of stacking.
         max_seconds: simulated time limit of an episode; None: the task's own.
-        video: make a video of the first episode, where there is a single cell.
+        video: make videos: of the first failure of each kind, and of the first episode where there is a single cell.
+        trajectories: keep what is measured at every tick, one .npz per episode that is run.
         settings: of the method; see its own settings for the keys.
     """
 
@@ -56,10 +57,11 @@ class RunConfig(BaseModel):
     env: dict[str, Any] = Field(default_factory=dict)
     max_seconds: Annotated[float, Field(gt=0, le=3600)] | None = None
     video: bool = True
+    trajectories: bool = False
     settings: dict[str, Any] = Field(default_factory=dict)
 
     def digest(self) -> str:
-        """Twelve hexadecimal digits of all that decides how an episode goes: not of name, video and episodes."""
+        """Twelve hexadecimal digits of all that decides how an episode goes: all but `BESIDE`."""
         return digest_of(self.model_dump(mode="json", exclude=set(BESIDE)))
 
 

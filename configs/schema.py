@@ -18,7 +18,7 @@ from .nested import MISSING, at, having, leaves, merged, without
 
 MAX_CELLS = 10_000
 ALLOWED = (*CELL_KEYS, *RUN_KEYS)
-FIXED = ("name", "video")
+FIXED = ("name", "video", "trajectories")
 """Keys that are the same in all cells."""
 NAMING = ("task", "robot", "level", "method")
 """Keys that a cell is called by."""

@@ -13,7 +13,7 @@ from ..planner.chain import FRAME
 from .arm_index import ArmIndex
 from .nearness import Nearness
 from .obstacles import Intruder, ObstacleSlots
-from .scene import FIRST_OBJECT, compiled_scene
+from .scene import FINGERS, FIRST_OBJECT, compiled_scene
 from .state import State, command, read_arms, read_objects
 from .things import Things
 
@@ -123,6 +123,11 @@ class Simulation:
         if bad < 0:
             mujoco.mj_step(self.model, self.data, substeps)
         return bad
+
+    def held(self) -> np.ndarray:
+        """(n_arms, n_objects) what the fingers of each arm touched in the state that was read last."""
+        fingers = FINGERS + 2 * np.arange(len(self._servos))
+        return self._touching[fingers, FIRST_OBJECT:] != 0.0
 
     def widest_opening(self, index: int) -> float:
         """Gap between the finger pads of an open gripper [m]."""

@@ -29,7 +29,7 @@ def deviation_of(kinematics: Kinematics, log: MotionLog) -> tuple[float, float]:
     path = np.array([pose.matrix for pose in log.demonstrated])
     tool = kinematics.moment(log.time, log.joints).tool
     coarse, wanted, spacing = _pass(kinematics, log.joints, tool, path, COARSE)
-    away = _gaps(tool, wanted).min(axis=1) > coarse + 2.0 * spacing
+    away = screw_gaps(tool, wanted).min(axis=1) > coarse + 2.0 * spacing
     start = int(np.flatnonzero(away).max(initial=0))
     fine, _, spacing = _pass(kinematics, log.joints[start:], tool[start:], path, FINE)
     return fine, spacing
@@ -47,7 +47,7 @@ def _pass(
     executed = kinematics.moment(np.zeros(len(fine)), fine).tool
     wanted = kinematics.interpolated(path, fractions[1])
     widest = max(float(_steps(curve).max(initial=0.0)) for curve in (executed, wanted))
-    return frechet(_gaps(executed, wanted)), wanted, widest
+    return frechet(screw_gaps(executed, wanted)), wanted, widest
 
 
 def frechet(gaps: np.ndarray) -> float:
@@ -79,7 +79,7 @@ def _vectors(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return poses[:, :3, 3], poses[:, :3, :3].reshape(len(poses), 9)
 
 
-def _gaps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def screw_gaps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(n, m) screw lengths [m] between poses (n, 4, 4) and (m, 4, 4)."""
     (p, r), (q, s) = _vectors(a), _vectors(b)
     square = (p * p).sum(axis=1)[:, None] + (q * q).sum(axis=1) - 2.0 * p @ q.T

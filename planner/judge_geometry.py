@@ -162,10 +162,11 @@ def _box_of(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 def _object_of(obstacle: Obstacle) -> Any:
     place = fcl.Transform(obstacle.pose.rotation, UNIT * obstacle.pose.position)
-    return fcl.CollisionObject(_geometry_of(obstacle.shape), place)
+    return fcl.CollisionObject(fcl_geometry(obstacle.shape), place)
 
 
-def _geometry_of(shape: Shape) -> Any:
+def fcl_geometry(shape: Shape) -> Any:
+    """A shape in fcl, in its own frame, its lengths in `UNIT`."""
     if isinstance(shape, Sphere):
         return fcl.Sphere(UNIT * shape.radius)
     if isinstance(shape, Capsule):
@@ -174,10 +175,10 @@ def _geometry_of(shape: Shape) -> Any:
         return fcl.Box(*(UNIT * extent for extent in shape.size))
     if isinstance(shape, Cylinder):
         return fcl.Cylinder(UNIT * shape.radius, UNIT * shape.length)
-    return _convex(UNIT * shape.vertices)
+    return fcl_convex(UNIT * shape.vertices)
 
 
-def _convex(vertices: np.ndarray) -> Any:
+def fcl_convex(vertices: np.ndarray) -> Any:
     """A convex polyhedron with its triangles turned outwards."""
     from scipy.spatial import ConvexHull
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from onedemo.bench.records import EpisodeRecord
 
 RECORD = EpisodeRecord(
+    cell="0123456789ab",
     index=0,
     seed=7,
     method="screw",
@@ -24,8 +25,9 @@ RECORD = EpisodeRecord(
     clearance=None,
     refused=0,
     numbers={"position_error": [0.001, 0.002], "yaw_error": [0.01, 0.02]},
+    metrics={"clearance": None, "tilt": 0.1},
     wall_seconds=0.5,
-    tick_us=[12.0, 60.0, 9000.0],
+    tick_us=[12.0, 60.0, 9000.0, 9000.0],
 )
 
 

@@ -35,6 +35,8 @@ class FakeBench:
             return {"record": asdict(fake_record(config, job["index"], job["scenario"]))}
         if job["kind"] == "show":
             return {"video": False, "figure_problem": "nothing to be seen"}
+        if job["kind"] == "film":
+            return {"problem": "nothing to be seen"}
         return {}
 
     def start(self, config, index):
@@ -73,7 +75,7 @@ def fake_record(config, index, scenario):
         success=bool(rng.uniform() < 0.8),
         numbers={"position_error": [float(rng.uniform())]},
         wall_seconds=time.monotonic(),
-        tick_us=[1.0, 2.0, float(time.monotonic())],
+        tick_us=[1.0, 2.0, float(time.monotonic()), 3.0],
         cell=config.digest(),
         scenario=scenario,
     )

@@ -39,7 +39,9 @@ def called(monkeypatch, capsys, *arguments):
     return stopped.value.code, said.out, said.err
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]])
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["report"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]]
+)
 def test_every_command_explains_itself(command, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = called(monkeypatch, capsys, *command, "--help")
@@ -105,7 +107,10 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             ["run", "headline", "sweep.task=[stack, juggle]", "method=screw"],
             "demonstration: is missing (in the cell tas",
         ),
-        (["fly"], "No such command 'fly'; onedemo knows: run, plan, perf, "),
+        (["report", "nowhere"], "nowhere: is not a run folder: there is no such folder"),
+        (["report", "a", "b"], "command line: --output: is needed where several runs are compared"),
+        (["report"], "Missing argument 'RUN'; usage: onedemo report [OPTIONS]"),
+        (["fly"], "No such command 'fly'; onedemo knows: run, report, plan, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
@@ -117,7 +122,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["perf", "now"], "Got unexpected extra argument(s) (now); usage: onedemo perf"),
         (
             ["perf", "--only", "warp"],
-            "unknown group or line of perf 'warp'; known: controller, planner, step, run, process",
+            "unknown group or line of perf 'warp'; known: controller, planner, step, run, process, report",
         ),
         (["perf", "--json", "no/x.json"], "--json: no/x.json cannot be written: there is no folder no"),
         (["demo", "import", "x.csv"], "Missing option '--output' / '-o'; usage: onedemo demo import"),

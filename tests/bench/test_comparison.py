@@ -16,6 +16,7 @@ from onedemo.bench.processes import Processes
 from onedemo.bench.records import ERROR, result_of
 from onedemo.bench.run_folder import table_hash
 from onedemo.bench.scenarios import Suite, read_suite
+from onedemo.bench.trace import Trace
 from onedemo.bench.workshop import Bench
 from onedemo.configs.cell import RunSettings
 from onedemo.planner.errors import BadConfig, OneDemoError
@@ -64,6 +65,21 @@ def test_ray_makes_the_same_bits(serial, tmp_path):
     grid, _, reference = serial
     executor = executor_for(RunSettings(executor="ray", workers=2), 10, tmp_path / "log")
     assert table_hash(completed(grid, tmp_path / "run", executor).values()) == table_hash(reference.values())
+
+
+def test_every_record_has_metrics_and_kept_trajectories_change_nothing(serial, tmp_path):
+    _, _, reference = serial
+    grid = grid_in(tmp_path, GRID.replace("video: false", "trajectories: true\nvideo: false"))
+    records = completed(grid, tmp_path / "run", Serial())
+    assert table_hash(records.values()) == table_hash(reference.values())
+    for (cell, index), record in records.items():
+        assert (record.metrics["clearance"] is None) == (record.clearance is None)
+        assert record.metrics["path_length"] > 0.0
+        assert len(record.tick_us) == 4
+        trace = Trace.load(tmp_path / "run" / "trajectories" / f"{cell}-{index}.npz")
+        assert trace.time[-1] == pytest.approx(record.seconds)
+        assert len(trace.obstacles) == len(trace.time) == round(record.seconds / trace.dt) + 1
+    assert len(list((tmp_path / "run" / "trajectories").iterdir())) == len(records) == 8
 
 
 def test_methods_see_the_same_scenarios(serial):
@@ -139,6 +155,15 @@ def test_what_a_policy_raises_is_a_failure_of_its_own(tmp_path, monkeypatch):
         assert (record.failure_reason, record.success) == (ERROR, False)
         assert record.detail == "ZeroDivisionError: float division by zero"
         assert record.scenario
+
+
+def test_a_trajectory_that_cannot_be_written_is_no_failure_of_the_policy(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "trajectories").touch()
+    grid = grid_in(tmp_path, GRID.partition("sweep")[0].replace("video", "trajectories: true\nvideo"))
+    with pytest.raises(OSError, match="trajectories"):
+        completed(grid, tmp_path / "run", Serial())
+    assert (tmp_path / "run" / "episodes.jsonl").read_bytes() == b""
 
 
 def test_environments_of_a_worker_are_few(monkeypatch, tmp_path):

@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 from fake_runs import ONE_CELL, completed, dispatcher, grid_in
 
+from onedemo.bench.finishing import report
 from onedemo.bench.records import FILE, RecordWriter, read_records
 from onedemo.bench.run_folder import Shard, gather, parsed_shard, read_cells, recorded, table_hash
-from onedemo.bench.run_report import write_report
 from onedemo.bench.scenarios import check_mergeable, read_suite
 from onedemo.planner.errors import BadConfig
 
@@ -205,11 +205,12 @@ def test_a_folder_keeps_its_config_and_its_scenarios(tmp_path):
 def test_a_report_is_made_of_the_folder_alone(tmp_path):
     grid = grid_in(tmp_path)
     records = completed(grid, tmp_path / "run", dispatcher())
-    lines = write_report(tmp_path / "run")
+    lines = report(tmp_path / "run")
     text = (tmp_path / "run" / "report.md").read_text()
     assert table_hash(records.values()) in text
     for cell in grid.cells:
-        assert f"| {grid.label(cell)} | 12 |" in text
-    assert len(lines) == 5
+        assert f"| {cell.task} {cell.level} | screw trim={cell.settings['trim']} | 12 |" in text
+        assert any(line.startswith(f"{grid.label(cell)}: ") for line in lines)
+    assert len(lines) == 6
     with pytest.raises(BadConfig, match="is this a run folder"):
-        write_report(tmp_path)
+        report(tmp_path)

@@ -1,97 +1,489 @@
+"""Reports of run folders: what they say, that they say it again, and that nobody's words run in them."""
+
 from __future__ import annotations
 
+import csv
 import json
-import math
+import shutil
+import subprocess
+import threading
 from dataclasses import replace
+from html.parser import HTMLParser
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
 
+import numpy as np
 import pytest
-from example_records import RECORD, some
+from example_runs import GOLDEN, changed, small_run, with_words
 
-from onedemo.bench.report import report_text, summary_row, verdict, write_summary
-from onedemo.bench.scenarios import scenarios_of
-from onedemo.bench.statistics import median, quantile, wilson
-from onedemo.configs.schema import load_config
-from onedemo.configs.shipped import shipped_config
+from onedemo.bench.escaping import csv_text, markdown_text, plain, slug
+from onedemo.bench.files import sha256_of
+from onedemo.bench.groups import groups_of, metric_tests, success_tests
+from onedemo.bench.methods import LOOKS, look_of
+from onedemo.bench.records import ERROR, FILE, HUNG, WORKER_DIED, encoded, read_records
+from onedemo.bench.report import write_report, write_report_of
+from onedemo.bench.report_tables import number, p_words
+from onedemo.bench.run_folder import table_hash
+from onedemo.bench.run_reading import merged, peak_speed, read_run, speeds_of
+from onedemo.bench.scenarios import Suite, frozen, read_suite
+from onedemo.bench.statistics import holm, mcnemar
+from onedemo.bench.videos import Video, chosen, video_of, videos_in
+from onedemo.planner.errors import BadConfig
 
-CONFIG = load_config(shipped_config("stack"))
-FAILED = replace(
-    RECORD, index=4, seed=104, success=False, failure_reason="dropped", stage="lifted block 2 of 3", detail="slipped"
-)
-REQUIRED = (
-    "method", "task", "robot", "level", "episodes", "successes", "safe_successes", "wilson_low", "wilson_high",
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed: apt install chromium")
+HOSTILE = [
+    "<script>document.title = 'ours'</script>",
+    "<img src=x onerror=\"document.title='ours'\">",
+    "[link](javascript:alert(1)) | javascript:alert(1)",
+    "</style></title><svg onload=alert(1)>",
+    "\u202etxt.exe \x00 \x1b[31m `code` # title\n# title",
+    "=HYPERLINK(\"http://x\")",
+    "y" * 10**6,
+]  # fmt: skip
+EMPTY = json.dumps({"version": 1, "suite": sha256_of([]), "scenarios": []})
+ODD = '{"version": 1, "run": "", "cells": [{"label": "", "config": {"name": "a", "task": "b", "episodes": true}}]}'
+
+
+class Page(HTMLParser):
+    """All tags with their attributes, and the text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.words = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = small_run(tmp_path_factory.mktemp("runs") / "run", tasks=("stack", "pour"))
+    write_report(folder)
+    return folder
+
+
+def test_the_report_is_the_golden_one(run):
+    """Renew it with `python tests/example_runs.py`, and read what has changed."""
+    assert (run / "report.md").read_text(encoding="utf-8") == GOLDEN.read_text(encoding="utf-8")
+
+
+def test_a_report_written_again_has_the_same_bytes(run):
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert {path.suffix for path in before} >= {".png", ".pdf", ".md", ".html", ".csv"}
+    write_report(run)
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+def test_the_page_needs_nothing_besides_itself(run):
+    text = (run / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert {tag for tag, _ in page.tags} <= {
+        "html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li", "div", "table", "thead",
+        "tbody", "tr", "th", "td", "span", "i", "b", "figure", "figcaption", "img", "a", "pre", "code", "details",
+        "summary",
+    }  # fmt: skip
+    policy = next(each["content"] for tag, each in page.tags if each.get("http-equiv"))
+    assert "default-src 'none'" in policy
+    for _, attributes in page.tags:
+        assert not any(name.startswith("on") for name in attributes)
+        assert attributes.get("src", "data:image/svg+xml;base64,").startswith("data:image/svg+xml;base64,")
+        if "href" in attributes:
+            assert (run / attributes["href"]).is_file()
+    assert len(text) < 3_000_000
+
+
+def test_both_reports_hold_the_same_numbers(run):
+    page, text = (
+        Page((run / "report.html").read_text(encoding="utf-8")),
+        (run / "report.md").read_text(encoding="utf-8"),
+    )
+    words = set(page.words)
+    for line in text.splitlines():
+        if line.startswith("| ") and "---" not in line:
+            for cell in line.replace("\\|", "/").strip("| ").split(" | "):
+                assert cell.replace("\\", "") in words, cell
+
+
+@pytest.mark.parametrize("words", HOSTILE, ids=range(len(HOSTILE)))
+def test_words_of_others_stay_words(tmp_path, words):
+    folder = with_words(small_run(tmp_path / "run", 3, levels=("L4",), methods=("screw", "rrt")), words)
+    write_report(folder)
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert not {"script", "svg", "iframe", "object", "link"} & {tag for tag, _ in page.tags}
+    for _, attributes in page.tags:
+        assert not any(name.startswith("on") for name in attributes)
+        assert "javascript:" not in " ".join(str(value) for value in attributes.values())
+    assert len(text) < 1_500_000
+    report = (folder / "report.md").read_text(encoding="utf-8")
+    assert len(report) < 30_000
+    assert report.count("```") == 2
+    outside = "".join(report.split("```")[::2])
+    assert "<script" not in outside.replace("\\<", "")
+    assert "](javascript" not in outside.replace("\\]", "")
+    assert "\n# title" not in outside
+    assert not any(c in report + text for c in "\u202e\x00\x1b")
+    widths = {len(row) for row in csv.reader((folder / "episodes.csv").open(encoding="utf-8"))}
+    assert len(widths) == 1
+    for row in csv.DictReader((folder / "episodes.csv").open(encoding="utf-8")):
+        assert not row["detail"].startswith("=")
+
+
+def browse(page: Path, profile: Path, *options):
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", *options]
+    return subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=120)
+
+
+@needs_browser
+def test_nothing_runs_and_nothing_is_asked_for_in_a_browser(tmp_path):
+    asked = []
+
+    class Listener(BaseHTTPRequestHandler):
+        def do_GET(self):
+            asked.append(self.path)
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Listener)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    url = f"http://127.0.0.1:{server.server_port}/"
+    tail = "<script>document.title='ours'</script>"
+    words = f"<script src='{url}s'></script><img src='{url}i' onerror=\"document.title='ours'\">{tail}"
+    folder = with_words(small_run(tmp_path / "run", 3, levels=("L4",), methods=("screw", "rrt")), words)
+    write_report(folder)
+    try:
+        (tmp_path / "asks.html").write_text(f"<img src='{url}control'><script>document.title='ran'</script>")
+        control = browse(tmp_path / "asks.html", tmp_path / "profile", "--dump-dom").stdout
+        dom = browse(folder / "report.html", tmp_path / "profile", "--dump-dom").stdout
+    finally:
+        server.shutdown()
+    assert "<title>ran</title>" in control, "the browser would have run a script"
+    assert asked == ["/control"], "and would have asked"
+    assert "<title>synthetic: 2 cells, 6 episodes</title>" in dom
+    assert "<script" not in dom
+
+
+@needs_browser
+@pytest.mark.parametrize("width, height", [(390, 844), (1280, 900)])
+def test_the_page_is_drawn_on_a_phone_and_on_a_desk(run, tmp_path, width, height):
+    from PIL import Image
+
+    picture = tmp_path / "page.png"
+    browse(
+        run / "report.html",
+        tmp_path / "profile",
+        f"--window-size={width},{height}",
+        f"--screenshot={picture}",
+        "--hide-scrollbars",
+    )
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    assert pixels.shape == (height, width, 3)
+    colored = np.ptp(pixels, axis=2) > 40
+    assert 0.001 < colored.mean() < 0.5, "bars and figures, on white"
+    assert (pixels.min(axis=2) < 100).mean() > 0.005, "letters"
+    assert (pixels[:, :8] > 240).all(), "a margin"
+
+
+def test_runs_of_the_same_scenarios_are_compared_and_others_refused(tmp_path):
+    ours = small_run(tmp_path / "ours", methods=("screw",))
+    theirs = small_run(tmp_path / "theirs", methods=("replay",), levels=("L1", "L4"))
+    files = write_report_of([ours, theirs], tmp_path / "both")
+    text = files[0].read_text(encoding="utf-8")
+    assert "| setting | n | screw | replay |" in text
+    assert "Paired tests against screw" in text
+    assert "onedemo run ours/config.yaml\nonedemo run theirs/config.yaml" in text
+    other = small_run(tmp_path / "other", methods=("replay",), seed=1)
+    with pytest.raises(BadConfig) as refused:
+        write_report_of([ours, other], tmp_path / "both")
+    hashes = [read_suite(folder).hash[:12] for folder in (ours, other)]
+    assert str(refused.value).count("\n") == 0
+    assert all(f"{each}" in str(refused.value) for each in (*hashes, ours, other))
+
+
+def test_of_an_episode_in_two_runs_the_first_counts_and_a_difference_is_said(tmp_path):
+    first, second = small_run(tmp_path / "a"), small_run(tmp_path / "b")
+    same = merged([read_run(first), read_run(second)])
+    assert table_hash(same.every) == table_hash(read_run(first).every)
+    assert same.warnings == ()
+    changed(second, lambda record: replace(record, success=not record.success, wall_seconds=9.0))
+    again = merged([read_run(first), read_run(second)])
+    assert table_hash(again.every) == table_hash(same.every)
+    assert len(again.warnings) == 6
+    assert "12 episodes" in again.warnings[0]
+
+
+def test_the_hash_of_results_knows_no_clock_and_no_order(tmp_path):
+    one = read_run(small_run(tmp_path / "a"))
+    slower = changed(
+        small_run(tmp_path / "b"), lambda record: replace(record, wall_seconds=7.0, tick_us=[1.0, 2.0, 3.0])
+    )
+    lines = (slower / FILE).read_bytes().splitlines(keepends=True)
+    (slower / FILE).write_bytes(b"".join(reversed(lines)))
+    assert table_hash(read_run(slower).every) == table_hash(one.every)
+    other = changed(slower, lambda record: replace(record, seconds=record.seconds + 1e-6))
+    assert table_hash(read_run(other).every) != table_hash(one.every)
+
+
+@pytest.mark.parametrize(
+    "file, content, message",
+    [
+        ("cells.json", "[]", "cells.json: is not a list of cells"),
+        ("cells.json", "{", "cells.json: is not a list of cells"),
+        ("cells.json", None, "cells.json: cannot be read: No such file or directory; is this a run folder?"),
+        ("cells.json", '{"version": 1, "run": "", "cells": []}', "cells.json: cells: is empty"),
+        ("cells.json", '{"version": 9}', "cells.json: version: is 9; known: 1"),
+        ("cells.json", ODD, "cells.json: is not a list of cells"),
+        ("scenarios.json", "[]", "scenarios.json: is not a list of scenarios"),
+        ("scenarios.json", None, "scenarios.json: is missing: the run has not begun"),
+        ("scenarios.json", EMPTY, "scenarios.json: scenarios: are not those of the cells"),
+        ("environment.json", "3", "environment.json: does not hold a table"),
+    ],
 )  # fmt: skip
+def test_a_folder_that_cannot_be_used_is_refused_in_one_line(tmp_path, file, content, message):
+    folder = small_run(tmp_path / "run", 2)
+    if content is None:
+        (folder / file).unlink()
+    else:
+        (folder / file).write_text(content)
+    with pytest.raises(BadConfig) as refused:
+        write_report(folder)
+    assert message in str(refused.value)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_run_in_parts_is_read_like_a_whole_one(tmp_path):
+    folder = small_run(tmp_path / "run")
+    whole = table_hash(read_run(folder).every)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    for k in range(3):
+        (folder / f"episodes.{k + 1}-of-3.jsonl").write_bytes(b"".join(lines[k::3]))
+    (folder / FILE).unlink()
+    assert table_hash(read_run(folder).every) == whole
+
+
+def test_damaged_lines_and_strangers_are_passed_over_and_named(tmp_path):
+    folder = small_run(tmp_path / "run", levels=("L1",), methods=("screw",))
+    records, _ = read_records(folder / FILE)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    odd = encoded(replace(records[3], metrics={"tilt": "high"}))
+    extra = [replace(records[0], index=99), replace(records[0], cell="f" * 12), records[0]]
+    whole = b"".join([*lines[:3], odd, *lines[4:], b"garbage\n", *(encoded(each) for each in extra), b'{"crc":1,"rec'])
+    (folder / FILE).write_bytes(whole)
+    run = read_run(folder)
+    assert [record.index for record in run.every] == [k for k in range(12) if k != 3]
+    assert run.warnings == (
+        "episodes.jsonl, line 13: not an episode record, skipped",
+        "episodes.jsonl, line 14: an episode of another run, skipped",
+        "episodes.jsonl, line 15: an episode of another run, skipped",
+        "episodes.jsonl, line 17: torn, its episode is run again",
+        "1 records hold values of other types and were passed over",
+    )
+    (folder / FILE).write_bytes(whole + b"\n" * 30)
+    assert len(read_run(folder).warnings) == 12
+    assert str(tmp_path) not in write_report(folder)[0].read_text(encoding="utf-8")
+
+
+def test_an_unfinished_run_has_a_report_that_says_so(tmp_path):
+    folder = small_run(tmp_path / "run", 5)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join(lines[:7]))
+    text = write_report(folder)[0].read_text(encoding="utf-8")
+    assert "Unfinished: 23 of the planned episodes are missing." in text
+    assert "2 of 5" in text
+    (folder / FILE).write_bytes(b"")
+    assert "0 episodes" in write_report(folder)[0].read_text(encoding="utf-8")
+
+
+def test_tests_are_of_pairs(run):
+    groups = groups_of(read_run(run))
+    found = {(t.setting.task, t.setting.level, t.label): t for t in success_tests(groups, lambda r: r.safe_success)}
+    assert len(found) == 8
+    by_place = {(g.setting.task, g.setting.level, g.label): g.records for g in groups}
+    ours, theirs = by_place["pour", "L4", "screw"], by_place["pour", "L4", "rrt"]
+    won = sum(a.safe_success and not b.safe_success for a, b in zip(ours, theirs, strict=True))
+    lost = sum(b.safe_success and not a.safe_success for a, b in zip(ours, theirs, strict=True))
+    test = found["pour", "L4", "rrt"]
+    assert (test.pairs, test.only_reference, test.only_other) == (12, won, lost)
+    family = [t for (_, _, label), t in found.items() if label == "rrt"]
+    assert [t.adjusted for t in family] == holm([mcnemar(t.only_reference, t.only_other) for t in family])
+
+
+def test_pairs_are_matched_by_scenario_and_not_by_order(tmp_path):
+    folder = small_run(tmp_path / "run", levels=("L1",), methods=("screw", "replay"))
+    whole = success_tests(groups_of(read_run(folder)), lambda record: record.success)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join(lines[:12] + lines[17:]))
+    (test,) = success_tests(groups_of(read_run(folder)), lambda record: record.success)
+    assert whole[0].pairs == 12
+    assert test.pairs == 7
+
+
+def test_metrics_of_successes_compare_pairs_in_which_both_succeeded(run):
+    groups = groups_of(read_run(run))
+    tests = {(t.setting.task, t.setting.level, t.label, t.name): t for t in metric_tests(groups)}
+    by_place = {(g.setting.task, g.setting.level, g.label): g.records for g in groups}
+    pairs = zip(by_place["stack", "L1", "screw"], by_place["stack", "L1", "replay"], strict=True)
+    both = [(a.metrics["path_ratio"], b.metrics["path_ratio"]) for a, b in pairs if a.success and b.success]
+    assert len(both) < 12
+    test = tests["stack", "L1", "replay", "path_ratio"]
+    assert test.difference.pairs == len(both)
+    assert test.difference.mean == pytest.approx(np.mean([a - b for a, b in both]))
+    assert ("stack", "L1", "replay", "clearance") not in tests
+    assert tests["stack", "L4", "replay", "clearance"].difference.pairs == 12
+
+
+def described(cell):
+    return {"digest": cell.digest(), "label": "", "config": cell.model_dump(mode="json")}
+
+
+def with_cells(folder, *changes):
+    """The run with more cells like its only one, all of whose episodes fail."""
+    (cell,) = read_run(folder).cells.values()
+    others = [cell.model_copy(update=change) for change in changes]
+    records, _ = read_records(folder / FILE)
+    text = json.dumps({"version": 1, "run": "", "cells": [described(each) for each in (*others, cell)]})
+    (folder / "cells.json").write_text(text)
+    with (folder / FILE).open("ab") as file:
+        for other in others:
+            file.write(b"".join(encoded(replace(each, cell=other.digest(), success=False)) for each in records))
+    return groups_of(read_run(folder))
+
+
+def test_two_cells_of_one_method_are_told_apart_and_compared(tmp_path):
+    folder = small_run(tmp_path / "run", 3, levels=("L1",), methods=("screw",))
+    groups = with_cells(folder, {"settings": {"motion": {"guide": 0.2}, "trim": 0.1}})
+    assert [group.label for group in groups] == ["screw", "screw motion.guide=0.2 trim=0.1"]
+    (test,) = success_tests(groups, lambda record: record.success)
+    assert (test.label, test.pairs) == (groups[1].label, 3)
+    assert test.only_other == 0
+
+
+def test_cells_that_share_a_setting_only_in_name_are_not_compared(tmp_path):
+    folder = small_run(tmp_path / "run", 3, levels=("L1",), methods=("screw",))
+    (cell,) = read_run(folder).cells.values()
+    other = cell.model_copy(update={"env": {"n_blocks": 2}, "max_seconds": 9.0})
+    suite = read_suite(folder)
+    more = [frozen(other, k, {"start": {"obstacles": []}, "refused": 0}) for k in range(3)]
+    Suite([*suite.scenarios, *more]).write(folder)
+    records, _ = read_records(folder / FILE)
+    (folder / "cells.json").write_text(
+        json.dumps({"version": 1, "run": "", "cells": [described(each) for each in (cell, other)]})
+    )
+    with (folder / FILE).open("ab") as file:
+        for record, each in zip(records, more, strict=True):
+            file.write(encoded(replace(record, cell=other.digest(), scenario=each["fingerprint"])))
+    groups = groups_of(read_run(folder))
+    assert [(group.label, len(group.records)) for group in groups] == [
+        ("screw", 3), ("screw env.n_blocks=2 max_seconds=9.0", 3),
+    ]  # fmt: skip
+    assert success_tests(groups, lambda record: record.success) == []
+
+
+def test_lost_episodes_are_failures_with_names_and_without_times(tmp_path):
+    folder = small_run(tmp_path / "run", 4, levels=("L1",), methods=("screw",))
+    reasons = [WORKER_DIED, HUNG, ERROR, HUNG]
+
+    def lost(record):
+        seconds = 0.0 if record.index < 3 else 60.0
+        ticks = [0.0] * 4 if record.index < 3 else [1.0, 2.0, 3.0, 4.0]
+        reason = reasons[record.index]
+        return replace(
+            record, success=False, failure_reason=reason, seconds=seconds, tick_us=ticks, metrics={}, clearance=None
+        )
+
+    text = write_report(changed(folder, lost))[0].read_text(encoding="utf-8")
+    for words in ("worker died", "worker hung", "error of the policy", "timeout"):
+        assert f"| screw | {words} |" in text
+    assert "| stack | Panda | screw | 0.0010 | 0.0020 | 0.0030 |" in text
+    assert [record.index for record in chosen(read_run(folder).every)] == [2, 3], "what was lost is not filmed"
+
+
+def test_a_method_looks_the_same_in_every_report():
+    looks = [(look.color, look.marker, look.line) for look in LOOKS.values()]
+    assert len(set(looks)) == len(looks)
+    assert look_of("screw") == LOOKS["screw"]
+    assert look_of("mine") == look_of("mine")
+
+
+def test_speeds_are_those_of_the_drawn_obstacles(tmp_path):
+    suite = read_run(small_run(tmp_path / "run")).suite
+    speeds = speeds_of(suite)
+    assert [each["level"] for each in suite.scenarios if each["fingerprint"] in speeds] == ["L4"] * 12
+    swinging = next(each for each in suite.scenarios if each["level"] == "L4" and speeds[each["fingerprint"]])
+    frequency = swinging["start"]["obstacles"][0]["frequency"]
+    assert speeds[swinging["fingerprint"]] == pytest.approx(0.1 * frequency)
+    assert peak_speed({"long": [0.0, 0.1, 0.0], "short": [0.0, 0.0, 0.2], "frequency": 2.0}) == pytest.approx(0.4)
+    assert peak_speed("x") == peak_speed({"long": "x", "frequency": 1}) == 0.0
+
+
+def test_videos_are_of_the_first_failure_of_each_kind_of_each_method(run):
+    records = read_run(run).every
+    few, many = chosen(records, 3), chosen(records, 100)
+    assert few == many[:3]
+    assert len({record.method for record in few}) == 3
+    kinds = {(record.method, record.failure_reason) for record in records if not record.success}
+    assert {(record.method, record.failure_reason) for record in many} == kinds
+    assert len(many) == len(kinds)
+    for record in many:
+        same = (r for r in records if (r.method, r.failure_reason) == (record.method, record.failure_reason))
+        assert next(r for r in same if not r.success) == record
+
+
+def test_a_video_is_linked_from_its_failure(tmp_path):
+    folder = small_run(tmp_path / "run")
+    records = read_run(folder).every
+    record = chosen(records)[0]
+    video = video_of(record)
+    (folder / "videos").mkdir()
+    (folder / video.file).touch()
+    (folder / "videos" / "javascript:alert(1).mp4").touch()
+    assert videos_in(folder) == [Video(record.cell, record.index, record.seed, record.failure_reason, video.file)]
+    text = write_report(folder)[0].read_text(encoding="utf-8")
+    assert text.count("[video](videos/") == 1
+    assert f"[video]({video.file})" in text
+    assert f'href="{video.file}"' in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_tables_hold_every_episode_and_every_cell(run):
+    with (run / "episodes.csv").open(encoding="utf-8") as file:
+        episodes = list(csv.DictReader(file))
+    with (run / "summary.csv").open(encoding="utf-8") as file:
+        cells = list(csv.DictReader(file))
+    assert len(episodes) == 144
+    assert len(cells) == 12
+    for cell in cells:
+        own = [row for row in episodes if row["cell"] == cell["cell"]]
+        safe = sum(row["success"] == row["safe"] == "1" for row in own)
+        assert safe == int(cell["safe_successes"])
+        assert float(cell["safe_success_rate"]) == pytest.approx(safe / 12)
+        assert float(cell["safe_success_low"]) <= safe / 12 <= float(cell["safe_success_high"])
+        assert float(cell["tick_us_max"]) == pytest.approx(max(float(row["tick_us_max"]) for row in own), rel=1e-3)
 
 
 @pytest.mark.parametrize(
-    "successes, episodes, low, high",
-    [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (49, 50, 0.8950, 0.9965), (81, 263, 0.2553, 0.3662)],
-)
-def test_the_interval_is_wilsons(successes, episodes, low, high):
-    """The last line: Newcombe 1998, table I."""
-    assert wilson(successes, episodes) == (pytest.approx(low, abs=2e-4), pytest.approx(high, abs=2e-4))
+    "value, text",
+    [(0.0, "0"), (0.012345, "0.0123"), (1.2345, "1.23"), (12.345, "12.3"), (123.45, "123"), (-0.5, "-0.500"),
+     (1e-9, "0.0000"), (float("nan"), "–"), (99.96, "100")],
+)  # fmt: skip
+def test_numbers_have_three_digits(value, text):
+    assert number(value) == text
 
 
-def test_statistics_of_nothing_say_so():
-    assert wilson(0, 0) == (0.0, 1.0)
-    assert math.isnan(median([]))
-    assert math.isnan(quantile([], 0.99))
-
-
-def test_a_row_counts_what_happened(tmp_path):
-    unsafe = replace(RECORD, index=5, safe=False, collision="link5-block1")
-    row = summary_row(CONFIG, [*some(4), FAILED, unsafe])
-    assert set(REQUIRED) <= set(row)
-    assert (row["episodes"], row["successes"], row["safe_successes"]) == (6, 5, 4)
-    assert row["failures"] == {"dropped": 1}
-    assert row["error_max"] == pytest.approx(2.0)
-    write_summary(tmp_path / "summary.json", [row])
-    assert json.loads((tmp_path / "summary.json").read_text())["rows"][0]["successes"] == 5
-    assert len(verdict(row)) == 3
-    assert "5 of 6 succeeded" in verdict(row)[0]
-
-
-def test_a_report_explains_every_failure_and_contact():
-    unsafe = replace(RECORD, index=5, seed=105, safe=False, collision="link5-block1")
-    records = [*some(3), FAILED, unsafe]
-    text = report_text(CONFIG, records, summary_row(CONFIG, records), ["note"], "onedemo run stack")
-    assert "| 4 | 104 | dropped | lifted block 2 of 3 | slipped |" in text
-    assert "- seed 105: link5-block1" in text
-    assert "onedemo run stack" in text
-    clean = report_text(CONFIG, some(3), summary_row(CONFIG, some(3)), [], "c")
-    assert "## Failures\n\nNone." in clean
-
-
-def test_a_run_without_any_success_says_so_in_words_and_null(tmp_path):
-    row = summary_row(CONFIG, [FAILED])
-    text = report_text(CONFIG, [FAILED], row, [], "c")
-    assert "0 of 1 succeeded" in text
-    assert "no success, so no error" in text
-    assert "nan" not in text.lower().replace("explanation", "")
-    write_summary(tmp_path / "summary.json", [row])
-    written = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)["rows"][0]
-    assert written["error_median"] is written["error_max"] is None
-    assert written["seconds_median"] == FAILED.seconds
-
-
-def test_the_words_of_a_run_of_nothing_are_no_numbers():
-    assert "nan" not in " ".join(verdict(summary_row(CONFIG, [])))
-
-
-@pytest.mark.parametrize(
-    "hostile", ["<script>alert(1)</script>", "a|b|c", "x\n# title\n", "[l](javascript:x)", "y" * 10**6]
-)
-def test_words_of_others_stay_words(hostile):
-    records = [replace(FAILED, detail=hostile, stage=hostile)]
-    text = report_text(CONFIG, records, summary_row(CONFIG, records), [], "c")
-    assert "<script>" not in text.replace("\\<", "")
-    assert "](javascript" not in text.replace("\\]", "")
-    assert "\n# title" not in text
-    assert len(text) < 5000
-    (line,) = [line for line in text.splitlines() if line.startswith("| 4 |")]
-    assert line.replace("\\|", "").count("|") == 6
-
-
-def test_scenarios_depend_on_seed_and_count_only():
-    longer = CONFIG.model_copy(update={"episodes": 20, "seed": 5, "method": "other"})
-    assert [scenario.seed for scenario in scenarios_of(longer)] == list(range(5, 25))
-    assert scenarios_of(CONFIG) == [s for s in scenarios_of(CONFIG.model_copy(update={"episodes": 20}))][:10]
+def test_small_pieces_of_text():
+    assert p_words(0.0004) == "< 0.001"
+    assert p_words(0.04) == "0.040"
+    assert p_words(float("nan")) == "–"
+    assert plain("a\x00\n b\u2028c") == "a b c"
+    assert len(plain("z" * 10**7)) == 300
+    assert markdown_text("a|b") == "a\\|b"
+    assert csv_text("+1") == "'+1"
+    assert slug("../../Etc passwd<>") == "etc-passwd"
+    assert slug("***") == "unnamed"

@@ -5,10 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import gymnasium as gym
 import numpy as np
 import pytest
+from imageio_ffmpeg import count_frames_and_secs
 
+import onedemo.envs  # noqa: F401  (registers the ids)
+from onedemo.bench.episode import run_episode
+from onedemo.bench.failure_videos import record_video
+from onedemo.bench.scenarios import Scenario
 from onedemo.bench.showcase import Film
+from onedemo.bench.videos import video_of, videos_in
+from onedemo.configs.schema import RunConfig
 from onedemo.planner.errors import RenderingUnavailable
 
 
@@ -22,8 +30,6 @@ class Noise:
 
 
 def test_a_finished_video_has_its_name_and_all_its_pictures(tmp_path):
-    from imageio_ffmpeg import count_frames_and_secs
-
     with Film(tmp_path / "a.mp4") as film:
         for _ in range(7):
             film.take(Noise())
@@ -76,3 +82,27 @@ print(film.problem)
     (line,) = done.stdout.splitlines()
     assert "the video could not be written" in line
     assert list(tmp_path.iterdir()) == []
+
+
+class Still:
+    """A policy that does nothing."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.zeros(8), None
+
+
+def test_a_failure_is_filmed_once_or_there_is_a_reason(tmp_path):
+    env = gym.make("onedemo/Stack-v0", render_mode="rgb_array", max_episode_steps=9)
+    config = RunConfig(name="x", task="stack", method="still", demonstration="stack")
+    record, _ = run_episode(env, Still(), Scenario(3, 7, "L1"), config)
+    assert record.failure_reason == "timeout"
+    problem = record_video(env, Still(), record, config, tmp_path)
+    path = tmp_path / video_of(record).file
+    assert path.exists() == (problem == "")
+    if path.exists():
+        written = path.stat().st_mtime_ns
+        assert count_frames_and_secs(path)[0] == 3
+        assert record_video(env, Still(), record, config, tmp_path) == ""
+        assert path.stat().st_mtime_ns == written
+        assert [video.index for video in videos_in(tmp_path)] == [3]
+    env.close()
