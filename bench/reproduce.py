@@ -29,8 +29,7 @@ from .experiments import EXPERIMENTS, Drawing, Experiment, experiments_named
 from .files import write_whole
 from .reproduce_report import PAGE, Finished, write_page
 from .run import run_config
-from .run_folder import written_json
-from .run_report import FIGURE, VIDEO
+from .run_folder import FIGURE, VIDEO, written_json
 
 RUNS, FIGURES, VIDEOS, TREES = "runs", "figures", "videos", "trees.json"
 
