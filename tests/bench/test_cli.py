@@ -39,7 +39,9 @@ def called(monkeypatch, capsys, *arguments):
     return stopped.value.code, said.out, said.err
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]])
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["plan"], ["reproduce"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]]
+)
 def test_every_command_explains_itself(command, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = called(monkeypatch, capsys, *command, "--help")
@@ -81,6 +83,8 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             "task of a pose recording 'stack'; known: , pour",
         ),
         (["demo", "import", "none.csv", "-o", "x.npz", "--rate", "10"], "none.csv: file: does not exist"),
+        (["reproduce", "juggle"], "unknown experiment 'juggle'; known: pour, pour_obstacles, stack, shelve, shelve_one"),
+        (["reproduce", "--episodes", "0"], "--episodes"),
         (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, compare, headline, pour"),
         (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, compare, headline, pour"),
         (["run", "some/none.yaml"], "some/none.yaml: no such file"),
@@ -105,7 +109,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             ["run", "headline", "sweep.task=[stack, juggle]", "method=screw"],
             "demonstration: is missing (in the cell tas",
         ),
-        (["fly"], "No such command 'fly'; onedemo knows: run, plan, perf, "),
+        (["fly"], "No such command 'fly'; onedemo knows: run, plan, reproduce, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
