@@ -83,7 +83,10 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             "task of a pose recording 'stack'; known: , pour",
         ),
         (["demo", "import", "none.csv", "-o", "x.npz", "--rate", "10"], "none.csv: file: does not exist"),
-        (["reproduce", "juggle"], "unknown experiment 'juggle'; known: pour, pour_obstacles, stack, shelve, shelve_one"),
+        (
+            ["reproduce", "juggle"],
+            "unknown experiment 'juggle'; known: pour, pour_obstacles, stack, shelve, shelve_one",
+        ),
         (["reproduce", "--episodes", "0"], "--episodes"),
         (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, compare, headline, pour"),
         (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, compare, headline, pour"),
