@@ -84,16 +84,18 @@ def _section(each: Finished) -> str:
     experiment = each.experiment
     sentence = trees_agree(each.rows) if isinstance(experiment, Drawing) else run_agrees(each.rows[0])
     pictures = [f"![{experiment.title}]({picture})" for picture in each.pictures]
-    colors = "Blue: the demonstration. Magenta: the final paths. Cyan: led round what nobody showed."
-    if isinstance(experiment, Experiment):
-        more = f"Dashed: as executed. `onedemo run {experiment.config} {' '.join(experiment.overrides)}`"
+    colors = ["Blue: the demonstration.", "Magenta: the final paths."]
+    if isinstance(experiment, Drawing):
+        colors += ["Cyan: the collision-free path.", "Green: every tangent plane of the last tree."]
     else:
-        more = "Green: every tangent plane of the last tree."
+        among = each.rows[0]["clearance_mm_min"] is not None
+        colors += ["Cyan: led round what nobody showed."] if among else []
+        colors += [f"Dashed: as executed. `onedemo run {experiment.config} {' '.join(experiment.overrides)}`"]
     film = f"Video of the first seed: [{each.video}]({each.video})" if each.video else ""
     table = _tree_table(each.rows) if isinstance(experiment, Drawing) else ""
     lines = [
         f"## {experiment.title}", f"Paper: {experiment.paper}", f"{sentence} Differs: {experiment.here}.",
-        *pictures, f"{colors} {more}" if pictures else "", table, film,
+        *pictures, " ".join(colors) if pictures else "", table, film,
     ]  # fmt: skip
     return "\n\n".join(line for line in lines if line)
 
@@ -130,12 +132,12 @@ def trees_agree(rows: Sequence[Row]) -> str:
 
 
 def _tree_table(rows: Sequence[Row]) -> str:
-    head = ("scene", "planes", "levels", "a plane [ms]", "a detour [ms]", "a detour, per level [ms]", "whole plan [ms]")
-    keys = ("plane_ms", "detour_ms", "detour_level_ms")
-    lines = [
-        (row["scene"], row["planes"], row["levels"], *(_spread(*row[key]) for key in keys), f"{row['plan_ms']:.1f}")
-        for row in rows
-    ]
+    head = ("scene", "planes", "levels", "a plane [us]", "a detour [ms]", "a detour, per level [ms]", "whole plan [ms]")
+    lines = []
+    for row in rows:
+        plane = _spread(*(1e3 * value for value in row["plane_ms"]))
+        detour, level = _spread(*row["detour_ms"]), _spread(*row["detour_level_ms"])
+        lines.append((row["scene"], row["planes"], row["levels"], plane, detour, level, f"{row['plan_ms']:.1f}"))
     return (
         _table(head, lines)
         + "\n\nMean +- standard deviation of the processor's time; the whole plan once, by the clock. "
@@ -145,14 +147,7 @@ def _tree_table(rows: Sequence[Row]) -> str:
 
 def _times(runs: Sequence[Finished]) -> str:
     """Planner's time and motion's time, kept apart."""
-    head = (
-        "experiment",
-        "tick, median [us]",
-        "tick, p99 [us]",
-        "longest tick [ms]",
-        "motion, median [s]",
-        "longest [s]",
-    )
+    head = ("experiment", "tick, median [us]", "tick, p99 [us]", "longest [ms]", "motion, median [s]", "longest [s]")
     rows = []
     for each in runs:
         row = each.rows[0]
@@ -166,10 +161,11 @@ def _times(runs: Sequence[Finished]) -> str:
     return "\n\n".join([
         "## Times",
         _table(head, rows),
-        f"The planner's time for each tick of 20 ms, as called from Python; in the longest one a motion is planned "
-        f"with all its symmetric goals. The motion's time is simulated. The paper prints less than {LOOP_MS} ms for a "
-        f"loop, in C++; the median tick is below that in {below} of {len(runs)} experiments. Some of the times in the "
-        "paper's table have no unit, so they are not compared. The table: `times.csv`.",
+        f"The planner's time for each tick of 20 ms, by the clock, as called from Python; what else the machine does "
+        "shows in it; in the longest one a motion is planned with all its symmetric goals. The motion's time is "
+        f"simulated. The paper prints less than {LOOP_MS} ms for a loop, in C++; the median tick is below that in "
+        f"{below} of {len(runs)} experiments. Some of the times in the paper's table have no unit, so they are not "
+        "compared. The table: `times.csv`.",
     ])  # fmt: skip
 
 
@@ -205,7 +201,7 @@ def _said(value: float | None) -> str:
 
 
 def _spread(mean: float, deviation: float) -> str:
-    return f"{mean:.2g} +- {deviation:.1g}"
+    return f"{mean:.2f} +- {deviation:.2f}"
 
 
 def _machine() -> str:

@@ -23,8 +23,9 @@ from .jit import kernel
 from .pose import METERS_PER_RADIAN, PosePath
 from .workspace import LIMITS, PURSUIT, bound, pose_and_jacobian
 
-PROGRESS = 2e-3
-"""Screw length [m] that counts as progress: what creeps along an obstacle by less in the whole patience has stalled."""
+PROGRESS, SHARE = 2e-3, 0.1
+"""Screw length [m], or share of what is left, that counts as progress: what creeps along an obstacle by less in the
+whole patience has stalled."""
 FOLLOWING, ARRIVED, STALLED = 0, 1, 2
 INDEX, SIGN, BEST, WAITED = 0, 1, 2, 3
 
@@ -116,7 +117,8 @@ def pursue(work, path, q, dt, memory, qdot):
         qdot[i] = 0.0
     if index == last and distance <= work[PURSUIT, 2] and angle <= work[PURSUIT, 3]:
         return ARRIVED
-    if index > before or left < memory[BEST] - PROGRESS:
+    best = memory[BEST]
+    if index > before or left < max(best - PROGRESS, (1.0 - SHARE) * best):
         memory[BEST], memory[WAITED] = left, 0.0
     else:
         memory[WAITED] += dt

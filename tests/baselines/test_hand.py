@@ -111,3 +111,27 @@ def test_a_slower_hand_keeps_what_it_holds_and_its_limits(hand, pace):
     np.testing.assert_allclose(hand.arm.velocity_limits, pace * full)
     action = next(hand.follow(upwards(hand)))
     assert np.abs(action[:-1]).max() <= pace + 1e-9
+
+
+def aside(hand, way=0.4):
+    start = hand.arm.fk(hand.q)
+    return screw_path(start, Pose.from_position_quaternion([0.0, way, 0.0]) @ start, 0.005)
+
+
+@pytest.mark.parametrize("blocked", [True, False])
+def test_a_way_round_an_obstacle_is_kept_for_drawing(env, hand, blocked):
+    hand.release()
+    path, radius, seen = aside(hand), 0.04, env.reset(seed=0)[0]
+    middle = path.positions[len(path) // 2]
+    if blocked:
+        seen["obstacle_active"][0], seen["obstacle_shape"][0], seen["obstacle_size"][0] = 1, 1, radius
+        seen["obstacle_pose"][0] = [*middle, 1.0, 0.0, 0.0, 0.0]
+    hand.observation = seen
+    commanded = [hand.arm.fk(hand.q).position for _ in hand.follow(path)]
+    assert len(hand.drawn) == blocked
+    for drawn in hand.drawn:
+        assert drawn.label == "escape"
+        assert np.linalg.norm(drawn.poses.positions - middle, axis=1).min() > radius
+        gaps = np.linalg.norm(drawn.poses.positions[:, None] - np.array(commanded)[None], axis=2).min(axis=1)
+        assert gaps.max() < 0.02
+        assert np.linalg.norm(drawn.poses.positions[-1] - path.positions[-1]) < 0.02

@@ -40,7 +40,8 @@ def called(monkeypatch, capsys, *arguments):
 
 
 @pytest.mark.parametrize(
-    "command", [[], ["run"], ["report"], ["plan"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]]
+    "command",
+    [[], ["run"], ["report"], ["plan"], ["reproduce"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]],
 )
 def test_every_command_explains_itself(command, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
@@ -83,6 +84,11 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             "task of a pose recording 'stack'; known: , pour",
         ),
         (["demo", "import", "none.csv", "-o", "x.npz", "--rate", "10"], "none.csv: file: does not exist"),
+        (
+            ["reproduce", "juggle"],
+            "unknown experiment 'juggle'; known: pour, pour_obstacles, stack, shelve, shelve_one",
+        ),
+        (["reproduce", "--episodes", "0"], "--episodes"),
         (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, compare, headline, pour"),
         (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, compare, headline, pour"),
         (["run", "some/none.yaml"], "some/none.yaml: no such file"),
@@ -110,7 +116,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["report", "nowhere"], "nowhere: is not a run folder: there is no such folder"),
         (["report", "a", "b"], "command line: --output: is needed where several runs are compared"),
         (["report"], "Missing argument 'RUN'; usage: onedemo report [OPTIONS]"),
-        (["fly"], "No such command 'fly'; onedemo knows: run, report, plan, perf, "),
+        (["fly"], "No such command 'fly'; onedemo knows: run, report, plan, reproduce, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),

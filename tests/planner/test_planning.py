@@ -511,11 +511,14 @@ def simple_body(arm: Arm) -> Body:
 @pytest.mark.parametrize("dof", [6, 7])
 def test_arms_of_any_build_are_planned_for(dof):
     solved = tried = 0
-    for seed in range(8):
+    for seed in range(12):
         arm = random_arm(seed, dof, prismatic=0.1)
         body, rng = simple_body(arm), np.random.default_rng(seed)
         start = rng.uniform(-1.0, 1.0, dof)
         end = start + rng.uniform(-0.5, 0.5, dof)
+        alone = SceneWork.of(arm, body, (), SETTINGS)
+        if min(alone.room(start), alone.room(end)) < 0.0:
+            continue  # folded onto itself
         here, goal = arm.fk(start), arm.fk(end)
         path = screw_path(here, goal, 0.01)
         middle = path[len(path) // 2].position
@@ -529,7 +532,7 @@ def test_arms_of_any_build_are_planned_for(dof):
             assert_sound(found, arm, body, start, goal, obstacles)
         else:
             assert found.reason
-    assert solved >= 0.7 * tried
+    assert tried >= 6 and solved >= 0.7 * tried
 
 
 def test_an_arm_from_a_urdf_is_planned_for():
