@@ -6,7 +6,6 @@ import numpy as np
 
 from ..planner import dualquat as dq
 from ..planner.pose import METERS_PER_RADIAN, Pose, PosePath
-from ..planner.segment import resampled
 from ..planner.tsia import guide_index, imitated_path
 from .geometric_parts import POURING, Part
 
@@ -14,10 +13,8 @@ REACHED, TURNED = 0.005, 0.05
 """A goal is reached within these [m], [rad]; as the judge of plans has it."""
 SAMPLES = 200
 """Points, at equal steps of the tcp's way, that smoothness is taken from."""
-FINE, SLACK = 0.0005, np.deg2rad(5.0)
-"""Screw length [m] between the points of the demonstrated lip's curve, and how much earlier [rad] it begins."""
-REFINEMENTS = 45
-"""Steps of the search for the nearest point on a screw."""
+FINE, COARSE = 45, 15
+"""Steps of the search for the nearest point on a screw: down to rounding, and to some micrometers."""
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -45,13 +42,11 @@ def rim_drift(part: Part, path: PosePath, goal: Pose) -> float | None:
     """
     if part.lip is None:
         return None
-    dense = resampled(part.shown, FINE)
-    known = part.lips(dense.moved(part.shown[-1].inverse()))[part.tilts(dense) > POURING - SLACK]
     tilted = part.tilts(path) > POURING
     if not tilted.any():
         return float("nan")
     seen = part.lips(path.moved(goal.inverse()))[tilted]
-    return float(max(_to_line(point, known) for point in seen))
+    return float(max(_to_line(point, part.lip_curve) for point in seen))
 
 
 def _to_line(point: np.ndarray, line: np.ndarray) -> float:
@@ -95,10 +90,10 @@ def aligned_deviation(part: Part, path: PosePath, goal: Pose, guide: float) -> f
     In screw length. What follows imitation alone has none by construction, so this says nothing about who is better.
     """
     imitated = imitated_path(part.shown, goal)
-    return curve_gap(imitated[guide_index(imitated, guide) :], path)
+    return curve_gap(imitated[guide_index(imitated, guide) :], path, COARSE)
 
 
-def curve_gap(poses: PosePath, path: PosePath) -> float:
+def curve_gap(poses: PosePath, path: PosePath, refinements: int = FINE) -> float:
     """Largest distance of poses to a path [m], in screw length; between its own poses the path is a screw."""
     if len(path) == 1:
         return float(_gap(poses.dqs, path.dqs).max())
@@ -107,7 +102,7 @@ def curve_gap(poses: PosePath, path: PosePath) -> float:
     nearest = np.hypot(distance, METERS_PER_RADIAN * 2.0 * np.arccos(cosine)).argmin(axis=1)
     found = _gap(poses.dqs, path.dqs[nearest])
     for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, len(path) - 2)):
-        found = np.minimum(found, _to_screws(poses.dqs, path.dqs[first], path.dqs[first + 1]))
+        found = np.minimum(found, _to_screws(poses.dqs, path.dqs[first], path.dqs[first + 1], refinements))
     return float(found.max())
 
 
@@ -116,10 +111,10 @@ def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.hypot(distance, METERS_PER_RADIAN * angle)
 
 
-def _to_screws(poses: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+def _to_screws(poses: np.ndarray, first: np.ndarray, last: np.ndarray, refinements: int) -> np.ndarray:
     """(n,) distances of poses (n, 8) to screws, by golden sections."""
     low, high = np.zeros(len(poses)), np.ones(len(poses))
-    for _ in range(REFINEMENTS):
+    for _ in range(refinements):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         nearer = _gap(poses, dq.sclerp(first, last, left)) < _gap(poses, dq.sclerp(first, last, right))
         low, high = np.where(nearer, low, left), np.where(nearer, right, high)

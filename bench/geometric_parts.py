@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import NamedTuple
@@ -22,8 +21,10 @@ STEP = 0.005
 """Screw length [m] between the poses of a segment: what the policies' programs take."""
 TILTING = np.deg2rad(5.0)
 """Tilt of the held object [rad] at which a demonstrated pour begins."""
-POURING = np.deg2rad(60.0)
-"""Tilt [rad] from which on the lip must be where it was shown."""
+POURING, SLACK = np.deg2rad(60.0), np.deg2rad(5.0)
+"""Tilt [rad] from which on the lip must be where it was shown, and how much earlier its curve begins."""
+FINE = 0.0005
+"""Screw length [m] between the points of that curve."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ class Part:
         self.name, self.kind = name, kind
         self.shown = resampled(demonstration.segment_path(kind.segment), STEP)
         self.tcp_from_object = demonstration.path[grasp.stop].inverse() @ grasp.reference_pose
-        self.shape = kind.shape or Box(tuple(float(v) for v in demonstration.object_sizes[grasp.reference]))
+        x, y, z = (float(extent) for extent in demonstration.object_sizes[grasp.reference])
+        self.shape = kind.shape or Box((x, y, z))
+        assert demonstration.joint_positions is not None
         self.joints = demonstration.joint_positions[carried.start]
         self.reference = carried.reference_pose.position if carried.reference else self.shown[-1].position
         up = demonstration.path[grasp.stop].rotation.T @ standing.rotation[:, 2]
@@ -114,6 +117,12 @@ class Part:
         first = int(np.argmax(self.tilts(self.shown) > TILTING))
         lips = self.lips(self.shown)
         return float(np.linalg.norm(lips[first] - lips[-1]))
+
+    @cached_property
+    def lip_curve(self) -> np.ndarray:
+        """(n, 3) where the demonstration has the lip, as seen from its end, while the glass is tilted [m]."""
+        dense = resampled(self.shown, FINE)
+        return self.lips(dense.moved(self.shown[-1].inverse()))[self.tilts(dense) > POURING - SLACK]
 
     def lips(self, path: PosePath) -> np.ndarray:
         """(n, 3) the lip in the world [m]."""
@@ -171,8 +180,3 @@ def holding(name: str) -> Body:
 def tool_of(name: str) -> np.ndarray:
     """(m, 7) capsules of hand and held object, see `Body.tool`."""
     return holding(name).tool(robot().arm)
-
-
-def parts_of(names: Sequence[str]) -> list[Part]:
-    """Parts by name."""
-    return [part_named(name) for name in names]

@@ -164,7 +164,11 @@ def _pose(vector: Sequence[float]) -> Pose:
 
 def _written(one: Intruder) -> dict[str, Any]:
     shape = one.shape
-    size = {"size": _rounded(shape.size)} if isinstance(shape, Box) else {"radius": round(shape.radius, DIGITS)}
+    size: dict[str, Any] = {}
+    if isinstance(shape, Box):
+        size["size"] = _rounded(shape.size)
+    if isinstance(shape, Sphere | Capsule):
+        size["radius"] = round(shape.radius, DIGITS)
     if isinstance(shape, Capsule):
         size["length"] = round(shape.length, DIGITS)
     return {"shape": type(shape).__name__.lower(), **size, "pose": _rounded([*one.center, *one.rotation])}

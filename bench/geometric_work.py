@@ -8,7 +8,6 @@ method; only its last number, the time, differs from run to run.
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -18,11 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..baselines.geometric import leg_planner, made_path
+from ..baselines.makers import straight_path
+from ..baselines.mover import LegPlanner
 from ..planner import dualquat as dq
-from ..planner.errors import OneDemoError, PlanFailed
+from ..planner.errors import NotFinite, NotUnit, OneDemoError, PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.shapes import Obstacle
-from ..planner.tsia import GUIDE_START, guide_index, imitated_path
+from ..planner.tsia import GUIDE_START, guide_index, imitated_path, screw_path
 from . import geometric_metrics as metrics
 from .geometric_clear import ToolJudge
 from .geometric_parts import STEP, Part, holding, part_named, robot, tool_of
@@ -30,6 +31,9 @@ from .geometric_suite import GeometricSuite, Scenario, drawn, read_suite
 from .worker import main
 
 SHIPPED_GUIDE = 0.5
+COMMON = 0.3
+"""Fraction of the demonstration behind which all methods are compared with it when it is thinned: key poses move the
+guiding pose a little."""
 KEY_POSES = (600, 60, 24, 12, 6, 4)
 TOOL = Pose.from_position_quaternion(np.full(3, 0.1 / math.sqrt(3.0)), [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 """The other tool frame in the tcp: 10 cm away, turned by 90 degrees."""
@@ -49,32 +53,34 @@ class Method(NamedTuple):
         maker: the policy whose path maker it is.
         guide: fraction at which its blend ends.
         fill: how it reads the way between key poses.
-        avoids: it looks at obstacles.
+        planned: the path is that of an arm whose motion was planned; else that of a tool that flies freely.
     """
 
     maker: str
     guide: float = GUIDE_START
     fill: str = LINEAR
-    avoids: bool = False
+    planned: bool = False
 
 
 METHODS = {
-    "screw": Method("screw", fill=SCREW, avoids=True),
+    "screw": Method("screw", fill=SCREW, planned=True),
+    "repet": Method("screw", fill=SCREW),
     "tsia": Method("tsia", fill=SCREW),
     "tsia, guide 0.5": Method("tsia", SHIPPED_GUIDE, SCREW),
     "decoupled": Method("decoupled"),
     "replay": Method("replay"),
-    "dmp-goal": Method("dmp-goal", avoids=True),
-    "dmp-goal, screws": Method("dmp-goal", fill=SCREW, avoids=True),
-    "dmp-world": Method("dmp-world", avoids=True),
-    "potential": Method("potential", fill=SCREW, avoids=True),
-    "rrt": Method("rrt", avoids=True),
+    "dmp-goal": Method("dmp-goal"),
+    "dmp-goal, screws": Method("dmp-goal", fill=SCREW),
+    "dmp-world": Method("dmp-world"),
+    "potential": Method("potential", fill=SCREW),
+    "rrt": Method("rrt", planned=True),
 }
-"""By name. Fills matter to the sparse track only."""
+"""By name: `screw` is the whole method, `repet` imitation with escape trees alone; fills matter where key poses are
+few."""
 TRACKS = {
-    "paths": ("screw", "tsia", "tsia, guide 0.5", "decoupled", "replay", "dmp-goal", "dmp-world", "potential", "rrt"),
+    "paths": tuple(name for name in METHODS if name != "dmp-goal, screws"),
     "sparse": ("tsia", "decoupled", "replay", "dmp-goal", "dmp-goal, screws", "dmp-world"),
-    "frames": ("screw", "tsia", "decoupled", "replay", "dmp-goal", "dmp-world", "potential"),
+    "frames": ("repet", "tsia", "decoupled", "replay", "dmp-goal", "dmp-world", "potential"),
 }
 """The methods of each track: where two must give the same path, one of them."""
 Row = dict[str, Any]
@@ -95,7 +101,8 @@ def path_row(scenario: Scenario, variant: str, name: str) -> Row:
 def sparse_row(scenario: Scenario, variant: str, name: str) -> Row:
     """The numbers of a path that was made from so many key poses, against the whole demonstration."""
     part = part_named(scenario.part)
-    return measured(scenario, name, filled(thinned(part.shown, int(variant)), METHODS[name].fill))
+    keys = thinned(part.shown, int(variant))
+    return measured(scenario, name, filled(keys, METHODS[name].fill), aligned_from=COMMON)
 
 
 def frames_row(scenario: Scenario, variant: str, name: str) -> Row:
@@ -117,8 +124,8 @@ def frames_row(scenario: Scenario, variant: str, name: str) -> Row:
             held, index = _in_frame(tool, TOOL), guide if variant == "tool" else None
             other = made(scenario, name, shown.with_tool(TOOL), start @ TOOL, goal @ TOOL, obstacles, held, index)
             other = other.with_tool(TOOL.inverse())
-    except PlanFailed as failure:
-        return {"made": False, "reason": failure.reason, "gap": None, "ms": _since(begun)}
+    except (PlanFailed, NotFinite, NotUnit) as failure:
+        return {"made": False, "reason": _reason(failure), "gap": None, "ms": _since(begun)}
     gap = max(metrics.curve_gap(other, first), metrics.curve_gap(first, other))
     return {"made": True, "reason": "", "gap": gap, "ms": _since(begun)}
 
@@ -146,34 +153,43 @@ def made(
         PlanFailed: it finds none.
     """
     method = METHODS[name]
-    if method.maker == "rrt":
-        plan = _sampler(scenario.part).plan(shown, scenario.joints, goal, obstacles, seed=scenario.index)
+    settings = {"motion": {"guide": method.guide}}
+    if method.planned:
+        plan = _planner(name, scenario.part).plan(shown, scenario.joints, goal, obstacles, seed=scenario.index)
         if not plan.success:
             raise PlanFailed(plan.reason, plan.detail)
         return PosePath(np.array([robot().arm.fk(q).dq for q in plan.joints]))
-    settings = {"motion": {"guide": method.guide}}
     return made_path(method.maker, shown, start, goal, obstacles, tool=tool, settings=settings, guide=guide)
 
 
 @cache
-def _sampler(part: str) -> Any:
-    return leg_planner("rrt", robot().arm, holding(part))
+def _planner(name: str, part: str) -> LegPlanner:
+    method = METHODS[name]
+    return leg_planner(method.maker, robot().arm, holding(part), {"motion": {"guide": method.guide}})
 
 
-def measured(scenario: Scenario, name: str, shown: PosePath) -> Row:
-    """Make a path and take its numbers; what there is none of is None."""
+def measured(scenario: Scenario, name: str, shown: PosePath, aligned_from: float | None = None) -> Row:
+    """Make a path and take its numbers; what there is none of is None.
+
+    Args:
+        scenario: where.
+        name: the method.
+        shown: the demonstration as the method gets it.
+        aligned_from: fraction of the demonstration from which on it is compared; None: the method's guiding pose.
+    """
     part, begun = part_named(scenario.part), time.perf_counter()
     try:
         path = made(scenario, name, shown, scenario.start, scenario.goal, scenario.obstacles, tool_of(part.name))
-    except PlanFailed as failure:
-        return {"made": False, "reason": failure.reason, "reached": False, "clear": False, "ms": _since(begun)}
+    except (PlanFailed, NotFinite, NotUnit) as failure:
+        return {"made": False, "reason": _reason(failure), "reached": False, "clear": False, "ms": _since(begun)}
     taken = _since(begun)
+    since = METHODS[name].guide if aligned_from is None else aligned_from
     clearance = ToolJudge(tool_of(part.name), scenario.obstacles).judged(path)
-    return {"made": True, "reason": "", **numbers(part, path, scenario.goal, name), "clear": clearance.clear,
+    return {"made": True, "reason": "", **numbers(part, path, scenario.goal, since), "clear": clearance.clear,
             "clearance": clearance.least, "ms": taken}  # fmt: skip
 
 
-def numbers(part: Part, path: PosePath, goal: Pose, name: str) -> Row:
+def numbers(part: Part, path: PosePath, goal: Pose, aligned_from: float) -> Row:
     """The numbers of a path that do not depend on obstacles."""
     distance, angle = metrics.ending(path, goal)
     values = {
@@ -185,7 +201,7 @@ def numbers(part: Part, path: PosePath, goal: Pose, name: str) -> Row:
         "way": metrics.way(path) / metrics.way(part.shown),
         "turning": metrics.turning(path) / metrics.turning(part.shown),
         "jerk": metrics.jerk(path),
-        "aligned": metrics.aligned_deviation(part, path, goal, METHODS[name].guide),
+        "aligned": metrics.aligned_deviation(part, path, goal, aligned_from),
     }
     finite = {key: None if value is None or math.isnan(value) else value for key, value in values.items()}
     return {"reached": metrics.is_reached(distance, angle), **finite}
@@ -204,9 +220,6 @@ def thinned(path: PosePath, count: int) -> PosePath:
 
 def filled(keys: PosePath, how: str) -> PosePath:
     """Key poses joined by screws, or by straight lines with slerp, in steps like those of a dense demonstration."""
-    from ..baselines.makers import straight_path
-    from ..planner.tsia import screw_path
-
     join = screw_path if how == SCREW else straight_path
     out = keys[:1]
     for k in range(len(keys) - 1):
@@ -214,12 +227,20 @@ def filled(keys: PosePath, how: str) -> PosePath:
     return out
 
 
+def _reason(failure: OneDemoError) -> str:
+    """Why there is no path: there is none, or its numbers ran away."""
+    return failure.reason if isinstance(failure, PlanFailed) else "diverged"
+
+
 def _since(begun: float) -> float:
     return 1e3 * (time.perf_counter() - begun)
 
 
 class GeometricBench:
-    """The workshop of geometric runs; jobs "draw" (seed, indices) and "rows" (folder, track, variant, methods, indices)."""
+    """The workshop of geometric runs.
+
+    Its jobs are "draw" (seed, indices) and "rows" (folder, track, variant, methods, indices).
+    """
 
     def __init__(self) -> None:
         self._suite: GeometricSuite | None = None
