@@ -34,6 +34,8 @@ SHIPPED_GUIDE = 0.5
 COMMON = 0.3
 """Fraction of the demonstration behind which all methods are compared with it when it is thinned: key poses move the
 guiding pose a little."""
+LEAST_TURNING = 0.1
+"""Rotation [rad] of a demonstration below which a path's is not divided by it."""
 KEY_POSES = (600, 60, 24, 12, 6, 4)
 TOOL = Pose.from_position_quaternion(np.full(3, 0.1 / math.sqrt(3.0)), [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 """The other tool frame in the tcp: 10 cm away, turned by 90 degrees."""
@@ -192,6 +194,7 @@ def measured(scenario: Scenario, name: str, shown: PosePath, aligned_from: float
 def numbers(part: Part, path: PosePath, goal: Pose, aligned_from: float) -> Row:
     """The numbers of a path that do not depend on obstacles."""
     distance, angle = metrics.ending(path, goal)
+    turned = metrics.turning(part.shown)
     values = {
         "end_distance": distance,
         "end_angle": angle,
@@ -199,7 +202,7 @@ def numbers(part: Part, path: PosePath, goal: Pose, aligned_from: float) -> Row:
         "tilt_excess": metrics.tilt(part, path) - part.shown_tilt,
         "rim_drift": metrics.rim_drift(part, path, goal),
         "way": metrics.way(path) / metrics.way(part.shown),
-        "turning": metrics.turning(path) / metrics.turning(part.shown),
+        "turning": metrics.turning(path) / turned if turned > LEAST_TURNING else math.nan,
         "jerk": metrics.jerk(path),
         "aligned": metrics.aligned_deviation(part, path, goal, aligned_from),
     }
