@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
@@ -78,13 +79,19 @@ def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) 
     """A settings dataclass, nested ones included, from mappings as YAML gives them."""
     _refuse_unknown(kind, values, source, "")
     try:
-        return TypeAdapter(kind).validate_python(dict(values), strict=False)
+        return _adapter(kind).validate_python(dict(values), strict=False)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise BadConfig(source, key, f"{first['msg']}, got {first['input']!r}") from None
     except OneDemoError as error:
         raise BadConfig(source, "", str(error)) from None
+
+
+@cache
+def _adapter(kind: type) -> TypeAdapter:
+    """Pydantic's view of a dataclass, which takes longer to make than many a path."""
+    return TypeAdapter(kind)
 
 
 def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:

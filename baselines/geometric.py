@@ -46,6 +46,7 @@ def made_path(
     *,
     tool: np.ndarray | None = None,
     settings: Mapping[str, Any] | None = None,
+    guide: int | None = None,
 ) -> PosePath:
     """The path that a policy would make; whether it reaches the goal, or stays clear, is for a judge to say.
 
@@ -57,6 +58,8 @@ def made_path(
         obstacles: where they are now.
         tool: (m, 7) capsules that move with the tcp, see `Body.tool`; None: a ball of 5 cm about it.
         settings: the policy's, as nested mappings.
+        guide: index in `demonstrated` of the guiding pose; None: by the settings, on a length that depends on which
+            point of the hand the tcp is.
 
     Raises:
         PlanFailed: no way round the obstacles was found.
@@ -66,7 +69,8 @@ def made_path(
         raise UnknownName("path maker", name, PATH_MAKERS)
     chosen, tool = settings_of(name, settings), point_tool(0.05) if tool is None else tool
     imitated = imitated_path(demonstrated, goal)
-    guide = guide_index(imitated, chosen.motion.guide)
+    if guide is None:
+        guide = guide_index(imitated, chosen.motion.guide)
     if isinstance(chosen, MadeSettings):
         return chosen.maker.make(demonstrated, start, goal, guide, NearTool(tool, obstacles)).path
     path = final_path(start, imitated, guide)

@@ -130,6 +130,33 @@ def reproduce(
 
 
 @app.command()
+def geometric(
+    scenarios: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="That they are drawn from.")] = 0,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("runs/geometric"),
+    method: Annotated[list[str] | None, typer.Option(help="Only this one; may be given again.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; one for each core.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the folder, and errors.")] = False,
+) -> None:
+    """Compare the path makers without physics, on thousands of scenarios.
+
+    Three tracks: levels L1 to L3; the demonstration thinned to a few key poses; other tool frames and other worlds.
+    Methods: screw, tsia, "tsia, guide 0.5", decoupled, replay, dmp-goal, "dmp-goal, screws", dmp-world, potential,
+    and rrt, which takes about a second a path and is run only if it is named.
+
+    What is done is kept: the same command goes on where it stopped. A folder that already has a suite.jsonl uses it.
+
+    Examples:
+    - onedemo geometric
+
+    - onedemo geometric --scenarios 200 --seed 7 -o runs/seven --method screw --method rrt
+    """
+    from .geometric_run import run_geometric
+
+    raise typer.Exit(run_geometric(scenarios, seed, output, methods=method or [], workers=workers, quiet=quiet))
+
+
+@app.command()
 def perf(
     json: Annotated[Path | None, typer.Option("--json", help="Also write the rows to this file.")] = None,
     only: Annotated[str, typer.Option("--only", help="Part of a line's name, or a shell pattern.")] = "*",

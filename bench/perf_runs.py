@@ -16,6 +16,7 @@ from .records import known_record
 EPISODE = "Stack episode, policy included / real time"
 PROCESSES = "two local workers, per episode / one"
 ACTORS = "two Ray actors, per episode / one"
+GEOMETRIC = "1000 geometric scenarios, all path makers, 2 cores / 5 minutes"
 CONFIG = RunConfig(name="perf", task="stack", demonstration="stack", video=False)
 SHORT = CONFIG.model_copy(update={"max_seconds": 10.0})
 BATCH, BATCHES = 8, 3
@@ -88,5 +89,30 @@ def _actors() -> Row:
     return _efficiency(ACTORS, RayActors(None, 3))
 
 
-RUN_LINES: dict[str, Callable[[], Row]] = {EPISODE: _episode, PROCESSES: _processes, ACTORS: _actors}
+def _geometric() -> Row:
+    """Some scenarios of every cell drawn, made and measured in this process, by processor time."""
+    from .geometric_run import missing
+    from .geometric_suite import cells, drawn, scenario_of
+    from .geometric_work import TRACKS, rows_of
+
+    methods = [name for name in TRACKS["paths"] if name != "rrt" and not missing(name)]
+    count, seconds, paths = 3 * len(cells()), 0.0, 0
+    for k in range(-len(cells()), count):  # the first round compiles
+        begun = time.process_time()
+        scenario = scenario_of(drawn(abs(k), 0))
+        rows = rows_of(scenario, "paths", scenario.level, methods)
+        if k >= 0:
+            seconds, paths = seconds + time.process_time() - begun, paths + len(rows)
+    note = (
+        f"{seconds / paths * 1e3:.0f} ms a path of {len(methods)} methods, drawing and judging included; processor time"
+    )
+    return row(GEOMETRIC, seconds / count * 1000.0 / 2.0 / 300.0, "ratio", 1.0, note)
+
+
+RUN_LINES: dict[str, Callable[[], Row]] = {
+    EPISODE: _episode,
+    PROCESSES: _processes,
+    ACTORS: _actors,
+    GEOMETRIC: _geometric,
+}
 """Name of a line: what measures it."""
