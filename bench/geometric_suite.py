@@ -128,7 +128,7 @@ def _drawn_once(part: Part, far: Range, rng: np.random.Generator) -> tuple | Non
     up = Pose.from_position_quaternion([0.0, 0.0, part.kind.raised])
     above = ((up @ goal,),) if part.kind.raised else ()
     leg = Leg(up @ start, up @ goal, ((start,), *above, (goal,)), part.shape, part.tcp_from_object, 0)
-    stage = Stage([leg], robot().arm, robot().body, joints, [], FLOOR)
+    stage = Stage([leg], robot().arm, robot().body, joints, [], [], FLOOR)
     orders = [Order("static", 0)] * int(rng.integers(1, far.obstacles + 1))
     found = placed(rng, "static", stage, orders)
     return None if found is None else (start, goal, joints, found)
