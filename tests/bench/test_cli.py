@@ -105,7 +105,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
             ["run", "headline", "sweep.task=[stack, juggle]", "method=screw"],
             "demonstration: is missing (in the cell tas",
         ),
-        (["fly"], "No such command 'fly'; onedemo knows: run, plan, perf, "),
+        (["fly"], "No such command 'fly'; onedemo knows: run, plan, geometric, perf, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
