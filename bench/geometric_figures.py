@@ -99,7 +99,7 @@ def _sparse(plt: Any, rows: Sequence[Row]) -> Any:
     """Rim drift of the pour and deviation of every segment against the number of key poses."""
     names, parts = methods_in(rows), list(dict.fromkeys(row["part"] for row in rows))
     shown = [(part, "rim_drift", "rim drift [mm]") for part in parts if part == "pour carry"]
-    shown += [(part, "aligned", "farthest off the demonstration [mm]") for part in parts]
+    shown += [(part, "aligned", "off the demonstration [mm]") for part in parts]
     columns = min(3, len(shown))
     lines = -(-len(shown) // columns)
     figure, grid = plt.subplots(

@@ -174,7 +174,7 @@ def first_of_each(suite: GeometricSuite, levels: Sequence[str], count: int) -> l
 
 
 def completed(folder: Path, suite: GeometricSuite, order: Order, dispatcher: Dispatcher, say: Any) -> list[Row]:
-    """All rows that are wanted, in their order; what is missing is made, and written as it comes."""
+    """All rows of the folder, in the tables' order; what is wanted and missing is made, and written as it comes."""
     from rich.progress import Progress
 
     file = folder / f"rows-{suite.hash[:12]}.jsonl"
@@ -190,7 +190,8 @@ def completed(folder: Path, suite: GeometricSuite, order: Order, dispatcher: Dis
                 out.write(canonical(row).encode() + b"\n")
             out.flush()
             progress.update(task, advance=len(answer["rows"]))
-    return [known[key] for key in wanted]
+    every = wanted_rows(suite, order._replace(methods=tuple(METHODS)))
+    return [known[key] for key in every if key in known]
 
 
 def jobs_for(folder: Path, todo: Iterable[tuple[str, str, str, int]]) -> list[Job]:
