@@ -41,4 +41,5 @@ def test_every_policy_takes_up_every_task(task_env, name):
     assert not report.failure_reason, report.detail
     assert np.abs(observation["joint_positions"] - before).max() > 0.1
     labels = {path.label for path in report.paths}
-    assert labels == {"demonstrated", "final"}
+    # a way through joint space is drawn as one round what was not shown
+    assert labels - {"escape"} == {"demonstrated", "final"}

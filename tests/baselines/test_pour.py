@@ -19,7 +19,7 @@ from onedemo.bench.scenarios import Scenario
 from onedemo.configs.schema import load_config
 from onedemo.configs.shipped import shipped_config, shipped_demonstration
 from onedemo.envs.pour_geometry import GLASSES, SOURCE, TARGET, level_hand, tcp_from_glass
-from onedemo.planner.demo_io import load_demonstration
+from onedemo.planner.demo_io import load_demonstration, save_demonstration
 from onedemo.planner.errors import BadDemonstration
 from onedemo.planner.pose import Pose
 from onedemo.planner.recordings import from_pose_table
@@ -127,10 +127,11 @@ def test_a_recording_that_never_tilts_is_refused(tmp_path):
 
 
 @needs_recording
-def test_the_motion_that_a_person_showed_a_real_panda_pours():
+def test_the_motion_that_a_person_showed_a_real_panda_pours(tmp_path):
     raw = from_pose_table(RECORDING, name="real", robot="Panda", rate=100.0, units="cm", licence="MIT")
     placed = pour_from_poses(raw)
-    config = load_config(shipped_config("pour_real"))
+    save_demonstration(placed.demonstration, tmp_path / "pour_real.npz")
+    config = load_config(shipped_config("pour_real"), [f"demonstration={tmp_path / 'pour_real.npz'}"])
     np.testing.assert_allclose(placed.stands, config.env["stands"], atol=1e-3)
     held = tcp_from_glass(GLASSES[SOURCE])
     assert np.degrees((placed.demonstration.path[0] @ held).tilt) < 5.0
