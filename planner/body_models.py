@@ -6,7 +6,6 @@ Not in the paper: it moves a point.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -129,12 +128,6 @@ def resting_pairs(arm: Arm, body: Body, keep: float = 0.0) -> list[tuple[int, in
             if abs(body.rows[i, FRAME] - body.rows[j, FRAME]) <= 1 or gap <= keep:
                 pairs.append((i, j))
     return pairs
-
-
-def body_pairs(arm: Arm, body: Body, keep: float) -> list[tuple[int, int]]:
-    """Pairs (i, j), i < j, of an arm's own capsules that may hit each other: all but `resting_pairs`."""
-    resting = set(resting_pairs(arm, body, keep))
-    return [pair for pair in combinations(range(len(body)), 2) if pair not in resting]
 
 
 def segment_distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:

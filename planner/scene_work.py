@@ -9,10 +9,10 @@ import numpy as np
 
 from .arm import Arm
 from .body import FRAME, Body
-from .body_models import body_pairs
 from .clearance import FIRST, GAP, KEEP, KIND, OTHER, SELF_MARGIN, find_near, room_at
 from .edges import tool_room, tool_work
 from .errors import BadOption
+from .own_pairs import body_pairs
 from .pose import Pose
 from .repet import MAX_OBSTACLES
 from .robot_work import (

@@ -50,6 +50,7 @@ PLANNER_ORDER = [
     "qp",
     "robot_work",
     "clearance",
+    "own_pairs",
     "barrier",
     "safety",
     "guarded",

@@ -8,7 +8,8 @@ import pytest
 from random_scenes import SETTINGS, demonstrated, panda, problem, solve
 
 from onedemo.envs.scene import ARM, FINGERS, compiled_scene
-from onedemo.planner.body_models import body_pairs, resting_pairs
+from onedemo.planner.body_models import resting_pairs
+from onedemo.planner.own_pairs import body_pairs
 from onedemo.planner.planning import Planner
 from onedemo.planner.scene_work import SceneWork
 
