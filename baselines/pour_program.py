@@ -110,8 +110,9 @@ class PourProgram:
             yield from self._fetch()
         grasped, shape = self._held(), self.task.objects[SOURCE].shape
         hand.hold(SOURCE, shape, grasped)
-        hand.allow(self._standing)
-        yield from hand.leave(self._lift(hand.arm.fk(hand.q)), OFF)
+        if self._stands():
+            hand.allow(self._standing)
+            yield from hand.leave(self._lift(hand.arm.fk(hand.q)), OFF)
         # the source slips a little while it is lifted: the goal is computed from how it is held now
         held = self._held()
         if held.gap(grasped)[0] > LOST:
@@ -124,6 +125,11 @@ class PourProgram:
     def _held(self) -> Pose:
         """`tcp_from_source` as observed."""
         return self.hand.measured_tcp.inverse() @ self.hand.object_pose(SOURCE)
+
+    def _stands(self) -> bool:
+        """Whether the source is on its stand, from which it must be lifted."""
+        bottom = self.hand.object_pose(SOURCE).position - [0.0, 0.0, 0.5 * self.task.objects[SOURCE].size[2]]
+        return float(np.linalg.norm(bottom - self.hand.observation["furniture_pose"][SOURCE, :3])) < OFF
 
     def _fetch(self) -> Iterator[np.ndarray]:
         way = self._chosen_fetch()

@@ -10,23 +10,41 @@ import numpy as np
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadOption, PlanFailed, UnknownName
+from ..planner.motions import MotionSettings
 from .bimanual_program import BimanualPourProgram
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
 from .pour_program import PourProgram
 from .program_settings import ProgramSettings
+from .reach_program import ReachProgram
 from .shelve_program import ShelveProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
 from .two_hands import TwoHands
 
-Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram
+Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram
 PROGRAMS = {
     "stack": StackProgram,
     "pour": PourProgram,
     "shelve": ShelveProgram,
     "bimanual_pour": BimanualPourProgram,
+    "reach": ReachProgram,
+    "place_one": StackProgram,
+    "tilt_pour": PourProgram,
+    "insert_one": ShelveProgram,
 }
+CONTROL_MODE = "joint_velocity"
+
+
+def at_rate(settings: ProgramSettings, dt: float) -> ProgramSettings:
+    """The settings with the time step [s] of a task, unless they say another one.
+
+    Raises:
+        BadOption: they do.
+    """
+    if settings.motion.dt not in (dt, MotionSettings().dt):
+        raise BadOption("motion.dt", f"{settings.motion.dt} s, but the task acts every {dt} s")
+    return replace(settings, motion=replace(settings.motion, dt=dt))
 
 
 class Episode:
@@ -47,10 +65,11 @@ class ProgramPolicy(EpisodePolicy):
     def __init__(self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings):
         if task.name not in PROGRAMS:
             raise UnknownName("task with a program", task.name, PROGRAMS)
-        self.task, self.demonstration, self.settings = settings.known(task), demonstration, settings
-        self.mover = settings.mover
-        if abs(settings.motion.dt - task.control_dt) > 1e-9:
-            raise BadOption("motion.dt", f"{settings.motion.dt} s, but the task acts every {task.control_dt} s")
+        if task.control_mode != CONTROL_MODE:
+            reason = f"{task.control_mode!r}, but the arm is moved by joint speeds: make the environment with"
+            raise BadOption("control_mode", f"{reason} control_mode={CONTROL_MODE!r}")
+        self.settings = settings = at_rate(settings, task.control_dt)
+        self.task, self.demonstration, self.mover = settings.known(task), demonstration, settings.mover
 
     def begin(self, observation: Observation) -> Episode:
         """A new episode; nothing is planned yet."""

@@ -52,11 +52,17 @@ class ShelveProgram:
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 
     def actions(self) -> Iterator[np.ndarray]:
-        """Fetch and shelve each book in order, then withdraw."""
+        """Fetch and shelve each book in order, then withdraw; a first one may be in the hand already."""
+        in_hand = self.hand.observation["motion_index"][0] == 1.0
         for k in range(len(self.hand.observation["goal_pose"])):
-            yield from self._awaited(k)
-            yield from self._fetch(k)
-            yield from self._lift(k)
+            if in_hand and k == 0:
+                yield from self.hand.grip(CLOSE, self.settings.close)
+                self.hand.slow_down(PACE)
+                self.hand.hold(k, self.task.objects[k].shape, self._held(k))
+            else:
+                yield from self._awaited(k)
+                yield from self._fetch(k)
+                yield from self._lift(k)
             yield from self._shelve(k)
             yield from self._retreat()
 

@@ -64,9 +64,14 @@ class StackProgram:
         ]
 
     def actions(self) -> Iterator[np.ndarray]:
-        """Fetch and place each object in order, then withdraw."""
-        for k in range(len(self.task.objects)):
-            yield from self._fetch(k)
+        """Fetch and place each object in order, then withdraw; what is placed or in the hand already is left so."""
+        first, in_hand = divmod(int(self.hand.observation["motion_index"][0]), 2)
+        for k in range(first, len(self.task.objects)):
+            if in_hand and k == first:
+                self.hand.allow(self._wanted(k))
+                yield from self.hand.grip(CLOSE, self.settings.close)
+            else:
+                yield from self._fetch(k)
             yield from self._place(k)
         last = len(self.task.objects) - 1
         away = self.hand.way_out(self._leg(last, self.approach, (), leaving=self.withdrawal))
@@ -92,7 +97,7 @@ class StackProgram:
         target = self.task.objects[k]
         grasped = self._held(k)
         self.hand.hold(k, target.shape, grasped)
-        lift = self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
+        lift = self._lift(k, grasped)
         if lift is not None:
             yield from self.hand.leave(lift, OFF)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
@@ -106,6 +111,13 @@ class StackProgram:
         yield from self.hand.wait(self.settings.settle)
         yield from self.hand.grip(OPEN, self.settings.open)
         self.hand.release()
+
+    def _lift(self, k: int, grasped: Pose) -> PosePath | None:
+        """Off what the object stands on, as shown; None where it is in the air already."""
+        pose, half = self.hand.object_pose(k), 0.5 * float(self.task.objects[k].size[2])
+        if pose.position[2] - half > self.task.table_height + OFF:
+            return None
+        return self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
 
     def _held(self, k: int) -> Pose:
         """`tcp_from_object` as observed."""

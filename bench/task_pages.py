@@ -6,6 +6,7 @@ import inspect
 from pathlib import Path
 from typing import Any
 
+from ..envs import IDS
 from .console import console, writing
 from .tasks import TASKS
 
@@ -24,8 +25,7 @@ def list_tasks() -> None:
     for head in ("id", "what it is", "seconds", "config"):
         table.add_column(head, no_wrap=head == "id")
     for name, facts in TASKS.items():
-        limit = _spec(facts.id).max_episode_steps or 0
-        table.add_row(facts.id, summary_of(facts.id), f"{limit / 50:.0f}", f"onedemo run {name}")
+        table.add_row(facts.id, summary_of(facts.id), f"{IDS[facts.id].seconds:g}", f"onedemo run {name}")
     console().print(table, soft_wrap=False)
 
 

@@ -62,5 +62,22 @@ TASKS = {
         "insert",
         upright=False,
     ),
+    "reach": TaskFacts("onedemo/Reach-v0", OFFSET, {"reach_offset": "position_error"}, upright=False, shown="stack"),
+    "place_one": TaskFacts(
+        "onedemo/PlaceOne-v0",
+        OFFSET,
+        {"stack_offset": "position_error", "stack_yaw": "yaw_error"},
+        "transfer",
+        shown="stack",
+    ),
+    "tilt_pour": TaskFacts("onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, shown="pour"),
+    "insert_one": TaskFacts(
+        "onedemo/InsertOne-v0",
+        OFFSET,
+        {"insertion_offset": "position_error", "insertion_angle": "angle_error"},
+        "insert",
+        upright=False,
+        shown="shelve",
+    ),
     "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, shown="pour"),
 }

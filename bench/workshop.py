@@ -112,6 +112,17 @@ def environment_key(config: RunConfig) -> str:
     return repr((config.task, config.robot, config.obstacles, sorted(config.env.items()), config.max_seconds))
 
 
+def action_limit(config: RunConfig) -> int:
+    """The time limit of an episode in actions."""
+    from ..envs import IDS
+
+    kind = IDS[TASKS[config.task].id]
+    seconds = kind.seconds if config.max_seconds is None else config.max_seconds
+    # what is no frequency is refused by the environment
+    rate = config.env.get("control_frequency", kind.frequency)
+    return max(1, round(seconds * rate)) if isinstance(rate, int) else kind.steps
+
+
 def made(config: RunConfig, render_mode: str | None = None) -> Any:
     """The environment of a config."""
     import gymnasium as gym
@@ -119,7 +130,6 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
     from .. import envs  # noqa: F401  (registers the ids)
     from ..planner import reactive
 
-    limit = None if config.max_seconds is None else max(1, round(config.max_seconds * 50))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env: Any = gym.make(
@@ -128,7 +138,7 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
             level=config.level,
             obstacles=config.obstacles,
             render_mode=render_mode,
-            max_episode_steps=limit,
+            max_episode_steps=action_limit(config),
             **config.env,
         )
     task = env.unwrapped.task

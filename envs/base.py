@@ -127,6 +127,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
             furniture=tuple(TaskFurniture.of(each) for each in things.furniture),
             touching=parts.touching,
             obstacles=SLOTS,
+            control_mode=self.control_mode,
         )
 
     @property

@@ -108,7 +108,7 @@ def allowed_contact(low, high, at_home):
 
 
 @kernel
-def _rim_gap(pose, height, other):
+def rim_gap(pose, height, other):
     """Horizontal distance [m] of the middle of a glass's rim to another glass's axis."""
     x, y, _ = screw.rotate((pose[3], pose[4], pose[5], pose[6]), (0.0, 0.0, 0.5 * height))
     return math.hypot(pose[0] + x - other[0], pose[1] + y - other[1])
@@ -135,7 +135,7 @@ def judged(poses, velocities, beads, touching, sizes, memory):
     held = touching[FINGERS, FIRST_OBJECT + SOURCE] != 0.0
     if held and source[2] > memory[Z] + LIFTED:
         memory[WAS_LIFTED] = 1.0
-    if memory[WAS_LIFTED] != 0.0 and _rim_gap(source, sizes[SOURCE, 1], target) < ARRIVED:
+    if memory[WAS_LIFTED] != 0.0 and rim_gap(source, sizes[SOURCE, 1], target) < ARRIVED:
         memory[WAS_THERE] = 1.0
     if memory[WAS_LIFTED] != 0.0 and memory[WAS_THERE] == 0.0:
         memory[TILT] = max(memory[TILT], tilt_of(source))
@@ -220,7 +220,7 @@ class PourProgress(Progress):
             return 1.0
         source, target = state.object_pose
         reach = 1.0 - math.tanh(5.0 * math.dist(state.tcp_pose[0, :3], source[:3]))
-        way = _rim_gap(source, self._sizes[SOURCE, 1], target)
+        way = rim_gap(source, self._sizes[SOURCE, 1], target)
         carry = 1.0 - math.tanh(5.0 * max(0.0, way - ARRIVED)) if self.verdict.held else 0.0
         poured = self.verdict.target / self.count
         return max(0.1 * reach + 0.1 * self.verdict.held + 0.2 * carry, 0.4 * (poured > 0.0)) + 0.5 * poured

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import gymnasium as gym
 
+
+class Id(NamedTuple):
+    """An environment.
+
+    Attributes:
+        entry_point: its class.
+        seconds: time limit.
+        frequency: of actions [Hz] by default.
+    """
+
+    entry_point: str
+    seconds: float
+    frequency: int = 50
+
+    @property
+    def steps(self) -> int:
+        """The time limit in actions."""
+        return round(self.seconds * self.frequency)
+
+
 IDS = {
-    "onedemo/Stack-v0": ("onedemo.envs.stacking:StackEnv", 3000),
-    "onedemo/Shelve-v0": ("onedemo.envs.shelving:ShelveEnv", 4500),
-    "onedemo/Pour-v0": ("onedemo.envs.pouring:PourEnv", 2000),
-    "onedemo/BimanualPour-v0": ("onedemo.envs.bimanual_pouring:BimanualPourEnv", 2000),
+    "onedemo/Stack-v0": Id("onedemo.envs.stacking:StackEnv", 60.0),
+    "onedemo/Shelve-v0": Id("onedemo.envs.shelving:ShelveEnv", 90.0),
+    "onedemo/Pour-v0": Id("onedemo.envs.pouring:PourEnv", 40.0),
+    "onedemo/BimanualPour-v0": Id("onedemo.envs.bimanual_pouring:BimanualPourEnv", 40.0),
+    "onedemo/Reach-v0": Id("onedemo.envs.reaching:ReachEnv", 7.5, 20),
+    "onedemo/PlaceOne-v0": Id("onedemo.envs.placing:PlaceOneEnv", 7.5, 20),
+    "onedemo/TiltPour-v0": Id("onedemo.envs.tilting:TiltPourEnv", 7.5, 20),
+    "onedemo/InsertOne-v0": Id("onedemo.envs.inserting:InsertOneEnv", 7.5, 20),
 }
-"""Id: entry point and time limit in control steps."""
+"""The last four are single motions of the others, for those who train."""
 
 
 def register_all() -> None:
     """Make the ids known to Gymnasium; doing it twice does no harm."""
-    for name, (entry_point, limit) in IDS.items():
+    for name, kind in IDS.items():
         if name not in gym.registry:
-            gym.register(name, entry_point=entry_point, max_episode_steps=limit)
+            gym.register(name, entry_point=kind.entry_point, max_episode_steps=kind.steps)

@@ -166,13 +166,15 @@ class ShelveProgress(Progress):
         goals: (n, 7) the slots of the books.
         start: (m, 7) where books and clutter are at the start.
         dt: seconds between states.
+        in_hand: the first book is in the hand from the start.
     """
 
-    def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float):
+    def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float, *, in_hand: bool = False):
         super().__init__(dt)
         self.n_books = len(goals)
         self._goals, self._start = goals, start.copy()
         self._lifted = np.zeros(self.n_books)
+        self._lifted[0] = float(in_hand)
         self._errors = np.zeros((2, self.n_books))
         self._best_stage = 0
         self._stages = [stage_name(best, self.n_books) for best in range(2 * self.n_books + 1)]

@@ -151,15 +151,17 @@ class StackProgress(Progress):
 
     Args:
         goals: (n, 7) where the blocks must end.
-        start: (n, 7) where they are at the start.
+        start: (n, 7) where they are, or stood, at the start.
         dt: seconds between states.
+        in_hand: the last one is in the hand from the start.
     """
 
-    def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float):
+    def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float, *, in_hand: bool = False):
         super().__init__(dt)
         self.n_blocks = len(goals)
         self._goals = goals
         self._memory = np.stack([start[:, 2], np.zeros(self.n_blocks)])
+        self._memory[WAS_LIFTED, -1] = float(in_hand)
         self._errors = np.zeros((2, self.n_blocks))
         self._best_stage = 0
         self._stages = [stage_name(best, self.n_blocks) for best in range(2 * self.n_blocks + 1)]

@@ -10,14 +10,15 @@ from ..planner.errors import BadOption
 from ..planner.pose import Pose
 from ..planner.shapes import Box
 from .base import OneDemoEnv
-from .layouts import BASE_GAP, LONG_GAP, RANGES, TABLE_EDGE, Layout, stack_layout
+from .layouts import BASE_GAP, LONG_GAP, RANGES, stack_layout
 from .options import check_known, checked_joints, checked_poses
 from .placement import Leg, Order
 from .render import Ghost
 from .robots import robot_named
 from .sim import Start
+from .stack_places import above, block_grasps, block_poses, check_places
 from .stack_rules import BLOCK, BLOCK_SIZE, StackProgress
-from .things import TABLE_HEIGHT, Solid, Things
+from .things import Solid, Things
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
 OPTIONS = ("level", "obstacles", "object_poses", "base_pose", "joint_positions")
@@ -27,8 +28,6 @@ ABOVE = (0.0, 0.04, 0.08)
 """Heights [m] above grasps and places at which the hand must find room beside obstacles."""
 PAPER_SPEED = 0.1
 """Of the obstacle that swings in front of the last block [m/s]."""
-DOWN = (0.0, 1.0, 0.0, 0.0)
-"""A hand that points down, fingers closing along world x (wxyz)."""
 
 
 class StackEnv(OneDemoEnv[StackProgress]):
@@ -94,7 +93,7 @@ class StackEnv(OneDemoEnv[StackProgress]):
     `position_error` (n,) [m], `yaw_error` (n,) [rad].
 
     ## Arguments
-    `robot="Panda"`, `n_blocks=3` (2 to 6), `level="L1"`, `obstacles=None` (what the level says) or `"none" |
+    `robot="Panda"`, `n_blocks=3` (1 to 6), `level="L1"`, `obstacles=None` (what the level says) or `"none" |
     "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
     `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`,
     `arm=None` (the robot's usual one; Baxter has "right" and "left", of which the other is parked).
@@ -117,8 +116,8 @@ class StackEnv(OneDemoEnv[StackProgress]):
         render_mode: str | None = None,
         arm: str | None = None,
     ):
-        if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 2 <= n_blocks <= 6:
-            raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 2 to 6")
+        if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 1 <= n_blocks <= 6:
+            raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 1 to 6")
         kind = robot_named(robot)
         kind.check_grip(BLOCK, robot, "a block")
         blocks = tuple(Solid(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
@@ -146,12 +145,12 @@ class StackEnv(OneDemoEnv[StackProgress]):
         axis = self.arms[0].chain[0, 4:6]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
         drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap, self._reach)
-        poses, base = _poses(drawn)
+        poses, base = block_poses(drawn)
         if "object_poses" in options:
             poses = checked_poses("object_poses", options["object_poses"], self.n_blocks)
         if "base_pose" in options:
             base = checked_poses("base_pose", [options["base_pose"]], 1)[0]
-        _check_places(poses, base)
+        check_places(poses, base)
         joints = np.clip(home + drawn.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
         if "joint_positions" in options:
             joints = checked_joints(options["joint_positions"], self.arms)
@@ -164,13 +163,13 @@ class StackEnv(OneDemoEnv[StackProgress]):
         """The carries: from above a block to above its place."""
         return [
             Leg(
-                start=_above(_grasps(block)[0], RAISED),
-                end=_above(_grasps(goal)[0], RAISED),
+                start=above(block_grasps(block)[0], RAISED),
+                end=above(block_grasps(goal)[0], RAISED),
                 keys=tuple(
-                    tuple(_above(grasp, up) for grasp in _grasps(pose)) for pose in (block, goal) for up in ABOVE
+                    tuple(above(grasp, up) for grasp in block_grasps(pose)) for pose in (block, goal) for up in ABOVE
                 ),
                 shape=Box(BLOCK_SIZE),
-                tcp_from_object=_grasps(block)[0].inverse() @ Pose.from_vector(block),
+                tcp_from_object=block_grasps(block)[0].inverse() @ Pose.from_vector(block),
                 motion=2 * k + 1,
             )
             for k, (block, goal) in enumerate(zip(start.objects, self._goal_pose, strict=True))
@@ -182,39 +181,3 @@ class StackEnv(OneDemoEnv[StackProgress]):
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BLOCK_SIZE)) for pose in self._goal_pose]
-
-
-def _grasps(block: np.ndarray) -> list[Pose]:
-    """Hands (tcp) that hold a block (7,) from above by its narrow side, half a turn apart."""
-    pose = Pose.from_vector(block)
-    yaws = (0.5 * np.pi, -0.5 * np.pi)
-    return [pose @ Pose.from_yaw([0, 0, 0], yaw) @ Pose.from_position_quaternion([0, 0, 0], DOWN) for yaw in yaws]
-
-
-def _above(pose: Pose, height: float) -> Pose:
-    return Pose.from_position_quaternion([0, 0, height]) @ pose
-
-
-def _poses(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    """World poses (n, 7) of the blocks and (7,) of the lowest goal."""
-    rows = np.vstack([layout.blocks, layout.base])
-    height = TABLE_HEIGHT + 0.5 * BLOCK_SIZE[2]
-    zeros = np.zeros(len(rows))
-    half = 0.5 * rows[:, 2]
-    poses = np.column_stack([rows[:, :2], zeros + height, np.cos(half), zeros, zeros, np.sin(half)])
-    return poses[:-1], poses[-1]
-
-
-def _check_places(poses: np.ndarray, base: np.ndarray) -> None:
-    """Refuse blocks off the table or inside each other, and a base place off the table or tilted."""
-    for k, pose in enumerate(poses):
-        if np.abs(pose[:2]).max() > TABLE_EDGE or pose[2] < TABLE_HEIGHT + 0.4 * BLOCK_SIZE[2]:
-            raise BadOption("object_poses", f"block {k} at {np.round(pose[:3], 3).tolist()} is not on the table")
-        for j in range(k):
-            apart = poses[j, :3] - pose[:3]
-            if np.hypot(*apart[:2]) < BLOCK and abs(apart[2]) < 0.9 * BLOCK_SIZE[2]:
-                raise BadOption("object_poses", f"blocks {j} and {k} are inside each other")
-    if np.abs(base[:2]).max() > TABLE_EDGE or abs(base[2] - TABLE_HEIGHT - 0.5 * BLOCK_SIZE[2]) > 0.005:
-        raise BadOption("base_pose", f"{np.round(base[:3], 3).tolist()} is not a place on the table")
-    if np.hypot(base[4], base[5]) > 0.01:
-        raise BadOption("base_pose", "is tilted; only a yaw is possible")

@@ -99,6 +99,7 @@ class TaskDescription:
         furniture: in the order of `furniture_pose`.
         touching: pairs (part of a body, fixture) that nobody needs to look at: a shoulder and the trunk it sits in.
         obstacles: how many there can be, the length of `obstacle_active`.
+        control_mode: what an action means; see the environment.
     """
 
     name: str
@@ -113,3 +114,4 @@ class TaskDescription:
     furniture: tuple[TaskFurniture, ...] = ()
     touching: tuple[tuple[str, str], ...] = ()
     obstacles: int = 0
+    control_mode: str = "joint_velocity"
