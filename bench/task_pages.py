@@ -15,6 +15,8 @@ CLIP_SECONDS = 8.0
 """Length of a clip; the episode is played as fast as that needs."""
 CLIP_FRAMES = 96
 CLIP_QUALITY = 55
+MOST_PICTURES = 300
+"""Drawn of an episode that takes its whole time."""
 
 
 def list_tasks() -> None:
@@ -83,20 +85,21 @@ def write_clip(task: str, file: Path) -> Path:
     env = made(config, "rgb_array")
     policy = policy_for(env, config)
     pictures: list[Any] = []
+    every = max(1, IDS[TASKS[task].id].steps // MOST_PICTURES)
     with writing("--write", file):
         run_episode(
-            env, policy, scenarios_of(config)[0], config, lambda env, _: pictures.append(_picture(env, pictures))
+            env, policy, scenarios_of(config)[0], config, lambda env, _: pictures.append(_picture(env, pictures, every))
         )
         env.close()
         _save(file, pictures)
     return file
 
 
-def _picture(env: Any, before: list[Any]) -> Any:
-    """Every tenth state as an image, None for the others."""
+def _picture(env: Any, before: list[Any], every: int) -> Any:
+    """Every so many states an image, None for the others."""
     from PIL import Image
 
-    return Image.fromarray(env.render()).resize(CLIP_SIZE) if len(before) % 10 == 0 else None
+    return Image.fromarray(env.render()).resize(CLIP_SIZE) if len(before) % every == 0 else None
 
 
 def _save(file: Path, pictures: list[Any]) -> None:

@@ -23,6 +23,8 @@ from .subtask import FREQUENCY, Agreement, SubTask, screw_error
 ONTO = ("table", "block")
 HELD = {"L0": (0.12, 0.12), "L1": (0.08, 0.16), "L2": (0.06, 0.20)}
 """Range of the held block's height above the table [m], by the name of a layout."""
+UP = 0.008
+"""Of the hand above the middle of a block that it holds from the start [m]: people take blocks by the upper half."""
 MAX_STARTS = 200
 
 
@@ -87,7 +89,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     By `level`: L0 the nominal place; L1 the block moved by up to 10 cm and turned by up to 30 degrees, its place by up
     to 5 cm and 30 degrees, held 8 to 16 cm above the table; L2 up to 20 cm, 10 cm, 120 degrees, 6 to 20 cm. L3, L4 and
     F are L2 with obstacles on the block's way, see `onedemo/Stack-v0`. R, S and T start as L1 does. With
-    `pregrasped=False` the block stands on the table and the hand is at its ready posture.
+    `pregrasped=False` the block stands on the table and the hand is at its ready posture; give `max_episode_steps=300`.
 
     ## Episode End
     `terminated` when a block has fallen off the table.
@@ -172,13 +174,13 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
         if "joint_positions" in options:
             hand = arm.fk(checked_joints(options["joint_positions"], self.arms)[0])
             origin = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-            poses[-1] = (hand @ block_grasps(origin)[0].inverse()).vector
+            poses[-1] = (hand @ block_grasps(origin, UP)[0].inverse()).vector
             return checked_joints(options["joint_positions"], self.arms)
         if "object_poses" in options:
             poses[-1] = checked_poses("object_poses", options["object_poses"], self.n_blocks)[-1]
         else:
             poses[-1, 2] += self.np_random.uniform(*HELD[layout])
-        q = holding_joints(arm, block_grasps(poses[-1]), joints[0])
+        q = holding_joints(arm, block_grasps(poses[-1], UP), joints[0])
         return None if q is None else q[None]
 
     def _legs(self, start: Start) -> list[Leg]:

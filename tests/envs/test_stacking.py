@@ -121,9 +121,9 @@ def test_bad_reset_options_are_named(env, options, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("n_blocks", [1, 7, 2.0, True, "3"])
+@pytest.mark.parametrize("n_blocks", [0, 7, 2.0, True, "3"])
 def test_a_bad_number_of_blocks_is_named(n_blocks):
-    with pytest.raises(BadOption, match="is not a whole number from 2 to 6"):
+    with pytest.raises(BadOption, match="is not a whole number from 1 to 6"):
         gym.make("onedemo/Stack-v0", n_blocks=n_blocks)
 
 
