@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import partial
 from itertools import cycle
@@ -9,12 +10,17 @@ from typing import Any
 
 import numpy as np
 
+from ..envs import IDS
 from .measuring import Row, row, seconds_per_call
 from .tasks import TASKS
 
 SWAY_STEPS = 50
 """Control steps in which the arm of the measured scene sways once."""
 POUR = "Pour step, 30 beads / Stack step"
+TRAINED = ("reach", "place_one")
+TRAINING_STEPS = 1500
+"""Steps of 50 ms that a core should do per second."""
+MORE = 4
 WORKERS = "step of two vector workers, per environment / of one"
 
 
@@ -97,9 +103,43 @@ def _workers() -> Row:
     return row(WORKERS, 0.5 * both / alone, "ratio", 1 / 1.7, note)
 
 
+def _training(task: str, name: str) -> Row:
+    """Whole episodes of random twists at 20 Hz, resets included, as a learner sees them."""
+    env, rng = started(task), np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (IDS[TASKS[task].id].steps, *env.action_space.shape))
+
+    def episode() -> None:
+        env.reset(seed=0)
+        for action in actions:
+            env.step(action)
+
+    (seconds,) = seconds_per_call(episode)
+    each = seconds / len(actions)
+    return row(name, each * 1e3, "ms", 1e3 / TRAINING_STEPS, f"{1.0 / each:.0f} steps of 50 ms per second, one core")
+
+
+def _memory(task: str, name: str) -> Row:
+    """What each further environment of a process takes."""
+    kept = [started(task)]
+    before = _resident()
+    kept += [started(task) for _ in range(MORE)]
+    return row(name, (_resident() - before) / MORE, "MB", 120.0, f"of {len(kept)} in one process")
+
+
+def _resident() -> float:
+    """Memory of this process [MB]."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
 def step_line(task: str) -> str:
     """Name of the line that measures a task's step."""
     return f"{_short(task)} step / raw mj_step"
+
+
+def training_line(task: str) -> str:
+    """Name of the line that measures how fast a learner could step a task."""
+    return f"{_short(task)} step at 20 Hz, resets included"
 
 
 def _short(task: str) -> str:
@@ -109,6 +149,8 @@ def _short(task: str) -> str:
 TASK_LINES: dict[str, Callable[[], Row]] = {
     **{step_line(task): partial(_step, task, step_line(task)) for task in TASKS},
     **{f"{_short(task)} soft reset": partial(_reset, task, f"{_short(task)} soft reset") for task in TASKS},
+    **{training_line(task): partial(_training, task, training_line(task)) for task in TRAINED},
+    **{f"{_short(task)}, a further one": partial(_memory, task, f"{_short(task)}, a further one") for task in TRAINED},
     POUR: _pour,
     WORKERS: _workers,
 }

@@ -15,7 +15,7 @@ DOWN = (0.0, 1.0, 0.0, 0.0)
 
 
 def block_grasps(block: np.ndarray, up: float = 0.0) -> list[Pose]:
-    """Hands (tcp) that hold a block (7,) from above by its narrow side, half a turn apart; `up` above its middle [m]."""
+    """Hands (tcp) that hold a block (7,) from above by its narrow side, half a turn apart, `up` over its middle [m]."""
     pose = Pose.from_vector(block) @ Pose.from_position_quaternion([0.0, 0.0, up])
     yaws = (0.5 * np.pi, -0.5 * np.pi)
     return [pose @ Pose.from_yaw([0, 0, 0], yaw) @ Pose.from_position_quaternion([0, 0, 0], DOWN) for yaw in yaws]
