@@ -32,3 +32,12 @@ def shipped_config(name: str) -> Path:
         UnknownName: there is none of that name; the message lists them.
     """
     return _shipped("config", "bench", ".yaml", name)
+
+
+def shipped_actor(name: str) -> Path:
+    """The .json of an actor that comes with the package, like "sac-stack-Panda".
+
+    Raises:
+        UnknownName: there is none of that name; the message lists them.
+    """
+    return _shipped("actor", "actors", ".json", name)
