@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
@@ -12,10 +12,12 @@ from pydantic import TypeAdapter, ValidationError
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadConfig, OneDemoError, UnknownName
+from .learned import METHODS, LearnedPolicy, LearnedSettings
 from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
 from .own_policy import is_own, own_policy
 from .policy import Policy
 from .program_policy import ProgramPolicy
+from .residual import METHOD, ResidualPolicy
 from .sampling_mover import SamplingPolicySettings
 from .screw_policy import ScrewPolicy, ScrewSettings
 
@@ -31,6 +33,11 @@ class PolicyKind:
     preset: Mapping[str, Any] = field(default_factory=dict)
 
 
+def _learned(name: str, task: TaskDescription, demonstration: Demonstration, settings: LearnedSettings) -> Policy:
+    """A policy that has seen what it needed of the demonstration when it was trained."""
+    return LearnedPolicy.found(name, task, settings)
+
+
 POLICIES = {
     "screw": PolicyKind(ScrewSettings, ScrewPolicy),
     "screw-no-repet": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False}),
@@ -43,6 +50,8 @@ POLICIES = {
     "dmp-world": PolicyKind(DmpWorldSettings),
     "potential": PolicyKind(PotentialSettings),
     "rrt": PolicyKind(SamplingPolicySettings),
+    **{name: PolicyKind(LearnedSettings, partial(_learned, name)) for name in METHODS},
+    METHOD: PolicyKind(LearnedSettings, ResidualPolicy.found),
 }
 
 

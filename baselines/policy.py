@@ -75,6 +75,11 @@ class EpisodePolicy(ABC):
     def act(self, observation: Observation, memory: Any) -> np.ndarray:
         """The action for one observation."""
 
+    def is_batch(self, observation: Observation) -> bool:
+        """True if there is a leading axis in every entry."""
+        # joint_positions is (arms, dof) in one observation
+        return np.ndim(observation["joint_positions"]) == 3
+
     def predict(
         self,
         observation: Observation,
@@ -90,8 +95,7 @@ class EpisodePolicy(ABC):
             episode_start: (n_envs,) True where a new episode has begun; None: only where state is None.
             deterministic: ignored, the policy is deterministic.
         """
-        # joint_positions is (arms, dof) in one observation
-        batched = np.ndim(observation["joint_positions"]) == 3
+        batched = self.is_batch(observation)
         rows = _rows(observation) if batched else [observation]
         started = np.zeros(len(rows), dtype=bool) if episode_start is None else np.atleast_1d(episode_start)
         memories: list[Any] = [None] * len(rows) if state is None else list(state)
@@ -104,5 +108,5 @@ class EpisodePolicy(ABC):
 
 
 def _rows(observation: Observation) -> list[dict[str, np.ndarray]]:
-    count = len(observation["joint_positions"])
+    count = len(next(iter(observation.values())))
     return [{key: value[i] for key, value in observation.items()} for i in range(count)]

@@ -37,12 +37,14 @@ LOOKS = {
     "rrt": Look("#444444", "*"),
     "bc": Look("#999933", "p"),
     "sac": Look("#44aa99", "d"),
+    "sac-her": Look("#44aa99", "H", "--"),
+    "sac-demo": Look("#117733", "d", "--"),
     "ppo": Look("#aa4499", ">"),
     "residual": Look("#661100", "8"),
 }
 """In the order of tables and legends."""
-SPARE = ("#117733", "#ddaa33", "#bb5566", "#004488", "#777777", "#aa3377")
-WITHOUT_DEMONSTRATION = ("rrt",)
+SPARE = ("#ee8866", "#ddaa33", "#bb5566", "#004488", "#777777", "#aa3377")
+WITHOUT_DEMONSTRATION = ("rrt", "sac", "sac-her", "ppo")
 STEPS_KEYS = ("env_steps", "training_steps", "total_steps", "steps")
 """Names under which the settings of a method that learns say how long."""
 

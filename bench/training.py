@@ -40,6 +40,10 @@ class Trainee:
     """
 
     def __init__(self, config: TrainConfig, seed: int, folder: Path):
+        import torch
+
+        # small networks are no faster with more, and sums would depend on their number
+        torch.set_num_threads(1)
         self.config, self.seed, self.folder = config, seed, folder
         env = seen_env(config)
         self.features, self.normalization = features_of(env, config)

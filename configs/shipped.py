@@ -41,3 +41,12 @@ def shipped_training(name: str) -> Path:
         UnknownName: there is none of that name; the message lists them.
     """
     return _shipped("training", "train", ".yaml", name)
+
+
+def shipped_actor(name: str) -> Path:
+    """The .json of an actor that comes with the package, like "sac-stack-Panda".
+
+    Raises:
+        UnknownName: there is none of that name; the message lists them.
+    """
+    return _shipped("actor", "actors", ".json", name)

@@ -48,6 +48,14 @@ class BadDemonstration(OneDemoError, ValueError):
         super().__init__(f"{path or 'demonstration'}: {key}: {reason}")
 
 
+class BadActor(OneDemoError, ValueError):
+    """A learned policy's file cannot be used, or is of another method, task, robot or control."""
+
+    def __init__(self, path: str | Path, key: str, reason: str):
+        self.path, self.key, self.reason = path, key, reason
+        super().__init__(f"{path}: {key}: {reason}")
+
+
 class BadConfig(OneDemoError, ValueError):
     """A configuration file or an override on the command line cannot be used."""
 

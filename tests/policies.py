@@ -6,7 +6,13 @@ from importlib.util import find_spec
 
 import pytest
 
+from onedemo.baselines.factory import POLICIES
+from onedemo.baselines.program_settings import ProgramSettings
+
 LIBRARIES = {"dmp-goal": "movement_primitives", "dmp-world": "movement_primitives", "rrt": "ompl"}
+PROGRAMS = sorted(name for name, kind in POLICIES.items() if issubclass(kind.settings, ProgramSettings))
+"""Those that run the task's program; the others are learned."""
+LEARNED = sorted(set(POLICIES) - set(PROGRAMS))
 
 
 def installed(*names: str) -> list:

@@ -13,7 +13,7 @@ SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("**
 LOWER = {
     "planner": set(),
     "envs": {"planner"},
-    "baselines": {"planner", "envs"},
+    "baselines": {"planner", "envs", "configs"},
     "configs": {"planner"},
     "bench": {"planner", "envs", "baselines", "configs"},
 }
@@ -139,6 +139,7 @@ ENVS_ORDER = [
 SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
 READERS = {"planner/models.py", "planner/body_models.py", "planner/judge_geometry.py"}
 ONE_FILE = {"robosuite": {"envs/table_model.py", "bench/perf.py"}, "pinocchio": {*READERS, "bench/peers.py"}}
+LEARNING = {"torch", "stable_baselines3", "sb3_contrib"}
 BANNED_CALLS = {"eval", "exec", "compile", "__import__", "breakpoint"}
 BANNED_MODULES = {"pickle", "marshal", "shelve", "dill", "joblib", "random", "requests", "urllib", "socket"}
 
@@ -262,6 +263,13 @@ def test_libraries_neither_print_nor_swallow_errors(path):
     for node in ast.walk(tree_of(path)):
         assert not (isinstance(node, ast.ExceptHandler) and node.type is None), f"line {node.lineno}: bare except"
         assert not (isinstance(node, ast.Call) and ast.unparse(node.func) == "print"), f"line {node.lineno}: print"
+
+
+@each_source
+def test_libraries_for_training_are_imported_only_when_they_are_needed(path):
+    top = [node for node in tree_of(path).body if isinstance(node, ast.Import | ast.ImportFrom)]
+    named = {alias.name for node in top for alias in node.names} | {getattr(node, "module", None) or "" for node in top}
+    assert not LEARNING & {name.split(".")[0] for name in named}
 
 
 def test_only_the_compiler_module_talks_to_numba():

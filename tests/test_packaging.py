@@ -50,8 +50,10 @@ def test_the_wheel_holds_code_configs_demonstrations_and_licences(tmp_path):
         f"onedemo/{path.relative_to(ROOT)}"
         for folder in ("planner", "envs", "baselines", "configs", "bench")
         for path in (ROOT / folder).glob("**/*")
-        if path.suffix in (".py", ".yaml", ".npz", ".typed") or path.name.startswith("LICENSE")
+        if path.suffix in (".py", ".yaml", ".npz", ".safetensors", ".typed") or path.name.startswith("LICENSE")
     }
+    sources |= {f"onedemo/{path.relative_to(ROOT)}" for path in (ROOT / "configs").glob("**/*.json")}
+    assert {f"onedemo/configs/{name}" for name in ("actors/README.md", "rl_zoo3/sac.yaml")} <= names
     assert sources <= names
     assert not [name for name in names if name.startswith(("tests", "onedemo/tests"))]
 

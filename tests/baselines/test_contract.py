@@ -5,7 +5,8 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 import pytest
-from policies import installed
+from actors import saved_actor
+from policies import LEARNED, PROGRAMS, installed
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import POLICIES, make_policy
@@ -19,6 +20,7 @@ from onedemo.planner.demo_io import load_demonstration
 from onedemo.planner.errors import BadConfig, BadOption, UnknownName
 
 each_policy = pytest.mark.parametrize("name", installed(*sorted(POLICIES)))
+each_program = pytest.mark.parametrize("name", installed(*PROGRAMS, "residual"))
 CONFIG = load_config(shipped_config("stack"))
 
 
@@ -31,6 +33,8 @@ def env():
 
 def a_policy(env, name="screw", settings=None):
     demonstration = load_demonstration(shipped_demonstration("stack"))
+    if name in LEARNED:
+        settings = {"checkpoint": saved_actor(env, name), **(settings or {})}
     return make_policy(name, env.unwrapped.task, demonstration, settings)
 
 
@@ -78,7 +82,7 @@ def test_two_instances_act_alike(env, name):
     np.testing.assert_array_equal(*runs)
 
 
-@each_policy
+@each_program
 def test_a_goal_out_of_reach_is_a_reason_not_an_exception(env, name):
     policy, observation = a_policy(env, name), env.reset(seed=0)[0]
     observation["object_pose"][:, :3] += [1.5, 0, 0]

@@ -6,14 +6,14 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from policies import installed
+from policies import PROGRAMS, installed
 from tune_opponents import RESERVED, nested
 
-from onedemo.baselines.factory import POLICIES, settings_of
+from onedemo.baselines.factory import settings_of
 from onedemo.configs.loader import load_mapping
 
 FOLDER = Path(__file__).parents[2] / "configs" / "tuning"
-OPPONENTS = sorted(name for name in POLICIES if name != "tsia" and not name.startswith("screw"))
+OPPONENTS = [name for name in PROGRAMS if name != "tsia" and not name.startswith("screw")]
 
 
 def test_every_opponent_was_tuned():

@@ -1,0 +1,124 @@
+"""Policies that were learned beforehand: an actor's file, no training, no torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..configs.shipped import shipped_actor
+from ..envs.task import TaskDescription
+from ..planner.errors import BadActor, BadOption, UnknownName
+from .actor import Actor
+from .actor_io import foreign, load_actor
+from .policy import EpisodePolicy, Observation
+
+METHODS = ("sac", "ppo", "sac-her", "sac-demo", "bc")
+"""Whose action is the actor's; `residual` adds it to another policy's."""
+HERE = Path("actor")
+"""What stands for the file of an actor that has none."""
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedSettings:
+    """Which actor acts.
+
+    Attributes:
+        checkpoint: name of a shipped actor, or a file as `load_actor` takes it; "": the shipped one of this method,
+            task and robot.
+        allow_pickle: a zip of Stable-Baselines3 is read too, which may run whatever code its author put into it;
+            needs the extra `rl`.
+    """
+
+    checkpoint: str = ""
+    allow_pickle: bool = False
+
+
+class LearnedPolicy(EpisodePolicy):
+    """Acts as its actor does; remembers nothing.
+
+    Args:
+        actor: it.
+        source: its file, for messages.
+
+    Raises:
+        BadActor: the actor is one that corrects another policy.
+    """
+
+    def __init__(self, actor: Actor, source: Path):
+        if actor.residual_scale:
+            raise BadActor(source, "residual_scale", "is not empty; only the method residual adds to another's action")
+        self.actor, self._source = actor, source
+
+    @classmethod
+    def by(cls, actor: Actor) -> LearnedPolicy:
+        """The policy of an actor that is at hand."""
+        return cls(actor, HERE)
+
+    @classmethod
+    def found(cls, method: str, task: TaskDescription, settings: LearnedSettings) -> LearnedPolicy:
+        """The policy of the actor that settings mean; see `found_actor`."""
+        return cls(*found_actor(method, task, settings))
+
+    @staticmethod
+    def by(actor: Actor) -> LearnedPolicy:
+        """The policy of an actor that is in memory."""
+        policy = LearnedPolicy.__new__(LearnedPolicy)
+        policy.actor, policy._source = actor, Path(actor.method)
+        return policy
+
+    def is_batch(self, observation: Observation) -> bool:
+        """See `EpisodePolicy`; in the goal form of an environment there are no joint positions to tell it by."""
+        key, shape = self.actor.features.shapes[0]
+        return key in observation and np.ndim(observation[key]) == len(shape) + 1
+
+    def begin(self, observation: Observation) -> tuple[()]:
+        """Nothing to remember, once the observation is known to be the actor's."""
+        check_seen(self.actor, observation, self._source)
+        return ()
+
+    def act(self, observation: Observation, memory: tuple[()]) -> np.ndarray:
+        """The actor's action."""
+        return self.actor(observation).astype(np.float64)
+
+
+def found_actor(method: str, task: TaskDescription, settings: LearnedSettings) -> tuple[Actor, Path]:
+    """The actor that the settings mean, fit for the method and the task; and its file.
+
+    Raises:
+        BadActor: the actor cannot be read, or is of another method, task, robot, control or observation.
+        BadOption: there is none.
+    """
+    path = _file(method, task, settings.checkpoint)
+    if settings.allow_pickle and foreign(path).startswith("is a zip"):
+        from .export import actor_of_zip
+
+        actor = actor_of_zip(path, task, method=method)
+    else:
+        actor = load_actor(path)
+    if misfit := actor.misfit(method, task):
+        raise BadActor(path, *misfit)
+    return actor, path
+
+
+def check_seen(actor: Actor, observation: Observation, source: Path) -> None:
+    """Refuse an observation that the actor was not made for.
+
+    Raises:
+        BadActor: naming the first entry that is missing or of another shape.
+    """
+    if unseen := actor.unseen({key: np.shape(value) for key, value in observation.items()}):
+        raise BadActor(source, *unseen)
+
+
+def _file(method: str, task: TaskDescription, checkpoint: str) -> Path:
+    name = checkpoint or f"{method}-{task.name}-{task.robot}"
+    try:
+        return shipped_actor(name)
+    except UnknownName as error:
+        if checkpoint:
+            return Path(checkpoint)
+        shipped = ", ".join(str(known) for known in error.known) or "none"
+        reason = f"no actor is shipped for {method!r} on {task.name} with {task.robot}; name a file (docs/learning.md)"
+        raise BadOption("checkpoint", f"{reason}; shipped: {shipped}") from None
