@@ -61,13 +61,6 @@ class LearnedPolicy(EpisodePolicy):
         """The policy of the actor that settings mean; see `found_actor`."""
         return cls(*found_actor(method, task, settings))
 
-    @staticmethod
-    def by(actor: Actor) -> LearnedPolicy:
-        """The policy of an actor that is in memory."""
-        policy = LearnedPolicy.__new__(LearnedPolicy)
-        policy.actor, policy._source = actor, Path(actor.method)
-        return policy
-
     def is_batch(self, observation: Observation) -> bool:
         """See `EpisodePolicy`; in the goal form of an environment there are no joint positions to tell it by."""
         key, shape = self.actor.features.shapes[0]

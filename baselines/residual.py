@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -14,7 +13,6 @@ from gymnasium import spaces
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadActor, BadOption
-from .actor import Actor
 from .actor import Actor
 from .learned import HERE, LearnedSettings, check_seen, found_actor
 from .policy import EpisodePolicy, Observation, PolicyReport
@@ -118,14 +116,6 @@ class ResidualPolicy(EpisodePolicy):
     def found(cls, task: TaskDescription, demonstration: Demonstration, settings: LearnedSettings) -> ResidualPolicy:
         """The policy of the actor that settings mean; see `found_actor`."""
         return cls(task, demonstration, *found_actor(METHOD, task, settings))
-
-    @staticmethod
-    def by(task: TaskDescription, demonstration: Demonstration, actor: Actor) -> ResidualPolicy:
-        """The policy of an actor that is in memory."""
-        policy = ResidualPolicy.__new__(ResidualPolicy)
-        policy.screw, policy.actor, policy._source = ScrewPolicy(task, demonstration), actor, Path(actor.method)
-        policy._scale = np.array(actor.residual_scale)
-        return policy
 
     def begin(self, observation: Observation) -> Episode:
         """The screw policy's memory."""

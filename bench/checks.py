@@ -108,6 +108,7 @@ def check_training(config: TrainConfig) -> None:
         BadConfig: an unknown name or argument.
         BadDemonstration: the demonstration is of something else.
     """
+    from ..baselines.task_episodes import EPISODES
     from .learners import chosen
 
     known = known_names()
@@ -115,6 +116,9 @@ def check_training(config: TrainConfig) -> None:
         _check_name(config.name, key, getattr(config, key), known)
     cell = RunConfig(name=config.name, task=config.task, demonstration=config.demonstration, env=config.env)
     _check_env(cell, config.name)
+    if config.task not in EPISODES:
+        reason = f"{config.task} is no task of one object; allowed: {', '.join(sorted(EPISODES))}"
+        raise BadConfig(config.name, "task", reason)
     for key in CHOSEN:
         if key in config.env:
             raise BadConfig(config.name, f"env.{key}", "is chosen by the algorithm")

@@ -52,4 +52,4 @@ class Clone:
             loss.backward()
             self.optimizer.step()
         self.num_timesteps += steps
-        self.loss = float(loss)
+        self.loss = float(loss.detach())

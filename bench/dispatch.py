@@ -110,7 +110,7 @@ class Dispatcher:
 
     def __init__(self, crew: Crew, workers: int, wall_seconds: float, build_seconds: float = BUILD_SECONDS):
         self.crew, self.workers = crew, workers
-        self._limits = dict.fromkeys(("episode", "train"), wall_seconds)
+        self._limits: dict[str, float] = {"episode": wall_seconds, "train": wall_seconds}
         self._build_seconds = build_seconds
         self._desks: list[_Desk] = []
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..baselines.extras import needed
 from ..baselines.task_episodes import task_episode
 from ..configs.training import TrainConfig
+from ..envs.subtask import HORIZON
 from ..planner.errors import BadConfig, BadOption
 from .train_env import base_env, learners_env, shown
 
@@ -21,7 +22,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "sac": OFF_POLICY,
     "sac-demo": OFF_POLICY,
     "residual": OFF_POLICY,
-    "sac-her": {**OFF_POLICY, "gamma": 0.95, "n_sampled_goal": 4},
+    "sac-her": {**OFF_POLICY, "gamma": 0.95, "n_sampled_goal": 4, "buffer_size": 200_000},
     "ppo": {**COMMON, "n_steps": 512, "batch_size": 256, "n_epochs": 10, "ent_coef": 0.0},
     "bc": {"learning_rate": 1e-3, "batch_size": 64},
 }
@@ -51,8 +52,9 @@ def chosen(config: TrainConfig) -> dict[str, Any]:
     values = {"hidden": HIDDEN, "envs": ENVS.get(config.algorithm, 1), **DEFAULTS[config.algorithm], **config.learner}
     if config.algorithm != "ppo" and values["envs"] != 1:
         raise BadConfig(config.name, "learner.envs", "is only for ppo; another learner steps one environment")
-    if "buffer_size" in values:
-        values["buffer_size"] = min(values["buffer_size"], config.steps)
+    if config.algorithm == "sac-her" and values["learning_starts"] < HORIZON:
+        reason = f"{values['learning_starts']} is less than {HORIZON}, the longest episode: hindsight needs a whole one"
+        raise BadConfig(config.name, "learner.learning_starts", reason)
     rollout = values.get("n_steps", 1) * values["envs"]
     if config.evaluate_every % rollout:
         reason = f"is not a multiple of learner.n_steps x learner.envs, {rollout}"
@@ -136,7 +138,8 @@ def symmetric_buffer() -> type:
             """Half of each."""
             half = batch_size // 2
             done, seen = super().sample(batch_size - half, env), self.demo.sample(half, env)
-            parts = (None if a is None else torch.cat([a, b]) for a, b in zip(done, seen, strict=True))
+            pairs: Any = zip(done, seen, strict=True)
+            parts: Any = (None if a is None else torch.cat([a, b]) for a, b in pairs)
             return type(done)(*parts)
 
     return SymmetricBuffer

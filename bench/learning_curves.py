@@ -11,7 +11,7 @@ import numpy as np
 from .figure_style import legend_above, new_figure, saved, styled
 from .methods import look_of
 from .rate_figures import share_axis
-from .statistics import hierarchical_bootstrap, interquartile_mean
+from .statistics import hierarchical_bootstrap, interquartile_mean, wilson
 from .training_points import Point
 
 HEIGHT, COLUMNS = 2.3, 2
@@ -20,9 +20,13 @@ Curves = Sequence[Sequence[Point]]
 
 
 def mean_interval(groups: Sequence[Sequence[bool]]) -> tuple[float, float]:
-    """95 % interval of the share of successes: seeds are drawn, then episodes of each."""
+    """95 % interval of the share of successes: seeds are drawn, then episodes of each.
+
+    Where all succeed, or none, there is nothing to draw; then Wilson's, as if all were one training's.
+    """
     _, low, high = hierarchical_bootstrap([np.asarray(group, dtype=float) for group in groups], np.mean)
-    return low, high
+    every = [success for group in groups for success in group]
+    return (low, high) if low < high else wilson(sum(every), len(every))
 
 
 def summary_rows(curves: Curves) -> list[tuple[int, float, float, float, float, float, float]]:

@@ -17,8 +17,8 @@ from .demo_commands import demonstration_path
 from .tasks import TASKS
 
 GOALS = ("achieved_goal", "desired_goal")
-MEASURED_EPISODES = 20
-"""Episodes of random actions that say how features are scaled."""
+MEASURED_EPISODES, MEASURED_STEPS = 20, 75
+"""Episodes of random actions, and their length, that say how features are scaled."""
 
 
 class ScaledGoals(gym.ObservationWrapper):
@@ -72,7 +72,7 @@ def features_of(env: Any, config: TrainConfig) -> tuple[Features, Normalization]
     """What is learned from, and how it is scaled: the same for all seeds."""
     goal = config.algorithm == "sac-her"
     features = Features.raw(env.observation_space) if goal else Features.of(env.observation_space)
-    measured = measured_normalization(env, features, episodes=MEASURED_EPISODES, seed=config.seed)
+    measured = measured_normalization(env, features, episodes=MEASURED_EPISODES, steps=MEASURED_STEPS)
     if not goal:
         return features, measured
     skip = sum(env.observation_space[key].shape[0] for key in GOALS)

@@ -47,7 +47,9 @@ class Trainee:
         self.config, self.seed, self.folder = config, seed, folder
         env = seen_env(config)
         self.features, self.normalization = features_of(env, config)
+        self._task, self._scale = env.unwrapped.task, getattr(env, "scale", ())
         env.close()
+        self._evaluation = base_env(config, reward="dense", end_on_success=True)
         _seed_all(seed, 0)
         self.model = self._made()
         self.points = [] if (last := last_leg(folder)) is None else self._loaded(last)
@@ -58,7 +60,7 @@ class Trainee:
         leg = len(self.points) + 1
         self._train(leg)
         actor = self.actor()
-        successes, returns = evaluated(self.config, actor)
+        successes, returns = evaluated(self.config, actor, self._evaluation)
         steps = int(self.model.num_timesteps)
         seconds = before + time.perf_counter() - begun
         point = Point(self.seed, leg, steps, successes, returns, round(seconds, 3))
@@ -68,9 +70,7 @@ class Trainee:
 
     def actor(self) -> Actor:
         """What has been learned so far."""
-        config, env = self.config, seen_env(self.config)
-        scale = getattr(env, "scale", ()) if config.algorithm == "residual" else ()
-        last = self.points[-1] if self.points else None
+        config, last = self.config, self.points[-1] if self.points else None
         training = Training(
             config.algorithm,
             steps=int(self.model.num_timesteps),
@@ -80,18 +80,16 @@ class Trainee:
             episodes=0 if last is None else len(last.successes),
             seconds=0.0 if last is None else last.seconds,
         )
-        actor = actor_of(
+        return actor_of(
             self.model.network if config.algorithm == "bc" else self.model,
-            env.unwrapped.task,
+            self._task,
             method=config.algorithm,
             features=self.features,
             normalization=self.normalization,
-            residual_scale=scale,
+            residual_scale=self._scale,
             config_hash=config.digest(),
             training=training,
         )
-        env.close()
-        return actor
 
     def _made(self) -> Any:
         config = self.config
@@ -146,15 +144,13 @@ class Trainee:
         return points_of(load_state(self.model, last))
 
 
-def evaluated(config: TrainConfig, actor: Actor) -> tuple[tuple[bool, ...], tuple[float, ...]]:
+def evaluated(config: TrainConfig, actor: Actor, env: Any) -> tuple[tuple[bool, ...], tuple[float, ...]]:
     """Successes and returns of an actor on the frozen scenarios: seeds from 0 on, as in a comparison."""
     from ..baselines.learned import LearnedPolicy
     from ..baselines.residual import ResidualPolicy
 
-    env = base_env(config, reward="dense", end_on_success=True)
-    task = env.unwrapped.task
     if config.algorithm == "residual":
-        policy: Any = ResidualPolicy.by(task, shown(config), actor)
+        policy: Any = ResidualPolicy.by(env.unwrapped.task, shown(config), actor)
     else:
         policy = LearnedPolicy.by(actor)
     successes, returns = [], []
@@ -168,7 +164,6 @@ def evaluated(config: TrainConfig, actor: Actor) -> tuple[tuple[bool, ...], tupl
             total, steps, over = total + float(reward), steps + 1, terminated or truncated
         successes.append(bool(info["success"]))
         returns.append(round(total + (limit - steps if info["success"] else 0), 6))
-    env.close()
     return tuple(successes), tuple(returns)
 
 
