@@ -10,6 +10,7 @@ import numpy as np
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadOption, PlanFailed, UnknownName
+from ..planner.pose import Pose
 from .bimanual_program import BimanualPourProgram
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
@@ -18,6 +19,7 @@ from .program_settings import ProgramSettings
 from .shelve_program import ShelveProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
+from .tool_frame import ToolMover
 from .two_hands import TwoHands
 
 Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram
@@ -42,13 +44,21 @@ class ProgramPolicy(EpisodePolicy):
     """The program of a task, from ONE demonstration.
 
     Sees the observation, the demonstration and the static task description, nothing else.
+
+    Args:
+        task: what to do.
+        demonstration: the one.
+        settings: of the program, and of how its legs are moved.
+        tool: `tcp_from_tool` of another frame of the hand, in which they are; None: in the tcp's.
     """
 
-    def __init__(self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings):
+    def __init__(
+        self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings, tool: Pose | None = None
+    ):
         if task.name not in PROGRAMS:
             raise UnknownName("task with a program", task.name, PROGRAMS)
         self.task, self.demonstration, self.settings = settings.known(task), demonstration, settings
-        self.mover = settings.mover
+        self.mover = settings.mover if tool is None else ToolMover(settings.mover, tool)
         if abs(settings.motion.dt - task.control_dt) > 1e-9:
             raise BadOption("motion.dt", f"{settings.motion.dt} s, but the task acts every {task.control_dt} s")
 

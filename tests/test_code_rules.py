@@ -71,6 +71,7 @@ PLANNER_ORDER = [
     "command",
     "foresight",
     "reactive",
+    "warm",
     "segment",
     "demo",
     "demo_io",
