@@ -119,7 +119,7 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
     import gymnasium as gym
 
     from .. import envs  # noqa: F401  (registers the ids)
-    from ..planner.warm import warm_up
+    from ..baselines.warm import warm_up_for
 
     limit = None if config.max_seconds is None else max(1, round(config.max_seconds * 50))
     with warnings.catch_warnings():
@@ -133,9 +133,7 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
             max_episode_steps=limit,
             **config.env,
         )
-    task = env.unwrapped.task
-    for arm, body in zip(task.arms, task.bodies, strict=True):
-        warm_up(arm, body)
+    warm_up_for(env.unwrapped.task)
     return env
 
 
