@@ -12,7 +12,10 @@ from pydantic import TypeAdapter, ValidationError
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadConfig, OneDemoError, UnknownName
+from ..planner.pose import Pose
+from ..planner.tsia import screw_path
 from .learned import METHODS, LearnedPolicy, LearnedSettings
+from .makers import straight_path
 from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
 from .own_policy import is_own, own_policy
 from .policy import Policy
@@ -20,21 +23,37 @@ from .program_policy import ProgramPolicy
 from .residual import METHOD, ResidualPolicy
 from .sampling_mover import SamplingPolicySettings
 from .screw_policy import ScrewPolicy, ScrewSettings
+from .sparse import Join, sparse
 
 Settings = TypeVar("Settings")
+OWN_TOOL = "moves the hand itself: only the legs of shipped policies can be moved in another frame of the hand"
 
 
 @dataclass(frozen=True, slots=True)
 class PolicyKind:
-    """A policy that a config may name: its settings' dataclass, its constructor, and settings that name it."""
+    """A policy that a config may name.
+
+    Attributes:
+        settings: their dataclass.
+        make: its constructor, given task, demonstration, settings and perhaps another frame of the hand.
+        preset: settings that the name stands for.
+        join: how it reads the way between key poses that are far apart.
+    """
 
     settings: type
-    make: Callable[[TaskDescription, Demonstration, Any], Policy] = ProgramPolicy
+    make: Callable[..., Policy] = ProgramPolicy
     preset: Mapping[str, Any] = field(default_factory=dict)
+    join: Join = screw_path
 
 
-def _learned(name: str, task: TaskDescription, demonstration: Demonstration, settings: LearnedSettings) -> Policy:
+def _learned(
+    name: str, task: TaskDescription, demonstration: Demonstration, settings: LearnedSettings, tool: Pose | None = None
+) -> Policy:
     """A policy that has seen what it needed of the demonstration when it was trained."""
+    if tool is not None:
+        raise BadConfig("tool", name, OWN_TOOL)
+    if name == METHOD:
+        return ResidualPolicy.found(task, demonstration, settings)
     return LearnedPolicy.found(name, task, settings)
 
 
@@ -44,19 +63,24 @@ POLICIES = {
     "screw-no-guard": PolicyKind(ScrewSettings, ScrewPolicy, {"guard": False}),
     "screw-ee-only": PolicyKind(ScrewSettings, ScrewPolicy, {"whole_arm": False}),
     "tsia": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False, "guard": False}),
-    "decoupled": PolicyKind(DecoupledSettings),
-    "replay": PolicyKind(ReplaySettings),
-    "dmp-goal": PolicyKind(DmpGoalSettings),
-    "dmp-world": PolicyKind(DmpWorldSettings),
+    "decoupled": PolicyKind(DecoupledSettings, join=straight_path),
+    "replay": PolicyKind(ReplaySettings, join=straight_path),
+    "dmp-goal": PolicyKind(DmpGoalSettings, join=straight_path),
+    "dmp-world": PolicyKind(DmpWorldSettings, join=straight_path),
     "potential": PolicyKind(PotentialSettings),
     "rrt": PolicyKind(SamplingPolicySettings),
-    **{name: PolicyKind(LearnedSettings, partial(_learned, name)) for name in METHODS},
-    METHOD: PolicyKind(LearnedSettings, ResidualPolicy.found),
+    **{name: PolicyKind(LearnedSettings, partial(_learned, name)) for name in (*METHODS, METHOD)},
 }
 
 
 def make_policy(
-    name: str, task: TaskDescription, demonstration: Demonstration, settings: Mapping[str, Any] | None = None
+    name: str,
+    task: TaskDescription,
+    demonstration: Demonstration,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    key_poses: int | None = None,
+    tool: Pose | None = None,
 ) -> Policy:
     """A policy for a task.
 
@@ -65,15 +89,22 @@ def make_policy(
         task: `env.unwrapped.task`.
         demonstration: the ONE demonstration.
         settings: the policy's settings as nested mappings; what is missing keeps its default.
+        key_poses: of each segment only so many are shown; the way between them is read as the policy would move, by
+            your own policy not at all. None: the whole demonstration is shown.
+        tool: `tcp_from_tool` of another frame of the hand, in which legs are planned and followed; see `tool_frame`.
 
     Raises:
         UnknownName: no such policy.
-        BadConfig: an unknown key, a wrong type, a value out of range.
+        BadConfig: an unknown key, a wrong type, a value out of range, or another frame for your own policy.
     """
     if is_own(name):
-        return own_policy(name, task, demonstration, settings or {})
-    chosen = settings_of(name, settings)
-    return POLICIES[name].make(task, demonstration, chosen)
+        if tool is not None:
+            raise BadConfig("tool", name, OWN_TOOL)
+        shown = demonstration if key_poses is None else sparse(demonstration, key_poses)
+        return own_policy(name, task, shown, settings or {})
+    chosen, kind = settings_of(name, settings), POLICIES[name]
+    shown = demonstration if key_poses is None else sparse(demonstration, key_poses, kind.join)
+    return kind.make(task, shown, chosen, tool)
 
 
 def settings_of(name: str, settings: Mapping[str, Any] | None = None) -> Any:

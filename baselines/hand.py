@@ -18,8 +18,7 @@ from ..planner.pose import Pose, PosePath
 from ..planner.shapes import Shape
 from ..planner.tsia import final_path
 from .choice import Choice, Leg, choose, way_out
-from .made_follower import MadeFollower
-from .mover import ESCAPE, MADE, SCREW, Mover
+from .mover import ESCAPE, PATH, SCREW, Mover
 from .policy import LabeledPath, Observation
 from .surroundings import Surroundings
 
@@ -157,7 +156,7 @@ class Hand:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", what was in the
                 hand is not.
         """
-        if plan is not None and plan.how in MADE and isinstance(self._planner, MadeFollower):
+        if plan is not None and plan.how == PATH:
             self._planner.follow(plan, loosely=loosely)
         else:
             self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..planner.arm import Arm
 from ..planner.body import Body
-from ..planner.command import ReactiveSettings
+from ..planner.command import Command, ReactiveSettings
 from ..planner.planning import Planner
 from ..planner.plans import Onward, Plan, PlanSettings
 from ..planner.pose import Pose, PosePath
@@ -49,6 +49,39 @@ class LegPlanner(Protocol):
         ...
 
 
+class Follower(Protocol):
+    """Does what `planner.reactive.ReactivePlanner` does."""
+
+    body: Body
+    settings: ReactiveSettings
+
+    def hold(self, body: Body) -> None:
+        """The body from now on; see `ReactivePlanner.hold`."""
+        ...
+
+    def see(self, obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]] = ()) -> None:
+        """What is around now; see `ReactivePlanner.see`."""
+        ...
+
+    def go(
+        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+    ) -> None:
+        """Follow a path to its end; see `ReactivePlanner.go`."""
+        ...
+
+    def follow(self, plan: Plan, *, loosely: bool = False) -> None:
+        """Follow a plan that is to be followed as it is; see `ReactivePlanner.follow`."""
+        ...
+
+    def stop(self) -> None:
+        """No leg; see `ReactivePlanner.stop`."""
+        ...
+
+    def step(self, q: ArrayLike) -> Command:
+        """The command for joints q; see `ReactivePlanner.step`."""
+        ...
+
+
 class Relative(NamedTuple):
     """The motion of one hand seen from another.
 
@@ -68,7 +101,7 @@ class Mover(Protocol):
         """What plans legs."""
         ...
 
-    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> ReactivePlanner:
+    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
         """What follows them."""
         ...
 
@@ -110,7 +143,7 @@ class ScrewMover:
         """See `Mover`."""
         return Planner(arm, body, settings)
 
-    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> ReactivePlanner:
+    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
         """See `Mover`."""
         return ReactivePlanner(arm, body, settings)
 

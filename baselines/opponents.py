@@ -16,13 +16,12 @@ from ..planner.body import Body
 from ..planner.command import ReactiveSettings
 from ..planner.plans import PlanSettings
 from ..planner.pose import Pose, PosePath
-from ..planner.reactive import ReactivePlanner
 from ..planner.tsia import GUIDE_START, guide_index
 from .dmp import Dmp, DmpSettings
 from .made_follower import MadeFollower
 from .made_planner import MadePlanner
 from .makers import Decoupled, Maker, Replay
-from .mover import LegPlanner, Mover, Relative, ScrewMover
+from .mover import Follower, LegPlanner, Mover, Relative, ScrewMover
 from .near_tool import NearTool
 from .potential import FieldSettings, Potential
 from .program_settings import ProgramSettings
@@ -38,7 +37,7 @@ class MadeMover:
         """See `Mover`."""
         return MadePlanner(arm, body, settings, self._maker)
 
-    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> ReactivePlanner:
+    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
         """See `Mover`."""
         return MadeFollower(arm, body, settings, self._maker)
 

@@ -11,6 +11,7 @@ from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.errors import BadOption, PlanFailed, UnknownName
 from ..planner.motions import MotionSettings
+from ..planner.pose import Pose
 from .bimanual_program import BimanualPourProgram
 from .hand import Hand
 from .policy import EpisodePolicy, Observation, PolicyReport
@@ -20,6 +21,7 @@ from .reach_program import ReachProgram
 from .shelve_program import ShelveProgram
 from .stack_program import StackProgram
 from .surroundings import Surroundings
+from .tool_frame import ToolMover
 from .two_hands import TwoHands
 
 Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram
@@ -60,16 +62,25 @@ class ProgramPolicy(EpisodePolicy):
     """The program of a task, from ONE demonstration.
 
     Sees the observation, the demonstration and the static task description, nothing else.
+
+    Args:
+        task: what to do.
+        demonstration: the one.
+        settings: of the program, and of how its legs are moved.
+        tool: `tcp_from_tool` of another frame of the hand, in which they are; None: in the tcp's.
     """
 
-    def __init__(self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings):
+    def __init__(
+        self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings, tool: Pose | None = None
+    ):
         if task.name not in PROGRAMS:
             raise UnknownName("task with a program", task.name, PROGRAMS)
         if task.control_mode != CONTROL_MODE:
             reason = f"{task.control_mode!r}, but the arm is moved by joint speeds: make the environment with"
             raise BadOption("control_mode", f"{reason} control_mode={CONTROL_MODE!r}")
         self.settings = settings = at_rate(settings, task.control_dt)
-        self.task, self.demonstration, self.mover = settings.known(task), demonstration, settings.mover
+        self.task, self.demonstration = settings.known(task), demonstration
+        self.mover = settings.mover if tool is None else ToolMover(settings.mover, tool)
 
     def begin(self, observation: Observation) -> Episode:
         """A new episode; nothing is planned yet."""

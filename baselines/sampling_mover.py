@@ -19,7 +19,7 @@ from ..planner.pose import Pose, PosePath
 from ..planner.reactive import ReactivePlanner
 from ..planner.shapes import Obstacle
 from .extras import needed
-from .mover import SCREW, LegPlanner, Mover, Relative
+from .mover import SCREW, Follower, LegPlanner, Mover, Relative
 from .program_settings import ProgramSettings
 from .sampling import SamplingSettings, joint_way, timed
 from .sampling_planner import NO_POSTURE, NO_WAY, SamplingPlanner
@@ -75,7 +75,7 @@ class SamplingMover:
         """See `Mover`."""
         return SamplingPlanner(arm, body, settings, self._sampling)
 
-    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> ReactivePlanner:
+    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
         """See `Mover`."""
         return SamplingFollower(arm, body, settings, self._sampling)
 

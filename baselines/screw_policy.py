@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from ..envs.task import TaskDescription
 from ..planner.demo import Demonstration
 from ..planner.plans import PlanSettings
+from ..planner.pose import Pose
 from ..planner.repet import RepetSettings
 from .mover import SCREW, Mover
 from .program_policy import PROGRAMS, ProgramPolicy
@@ -53,5 +54,11 @@ class ScrewSettings(ProgramSettings):
 class ScrewPolicy(ProgramPolicy):
     """TSIA with screw interpolation and the dual-quaternion controller, from ONE demonstration."""
 
-    def __init__(self, task: TaskDescription, demonstration: Demonstration, settings: ScrewSettings | None = None):
-        super().__init__(task, demonstration, settings or ScrewSettings())
+    def __init__(
+        self,
+        task: TaskDescription,
+        demonstration: Demonstration,
+        settings: ScrewSettings | None = None,
+        tool: Pose | None = None,
+    ):
+        super().__init__(task, demonstration, settings or ScrewSettings(), tool)

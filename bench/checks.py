@@ -88,10 +88,12 @@ def _check_env(cell: RunConfig, source: str | Path) -> None:
 
 
 def _check_settings(cell: RunConfig, grid: Grid) -> None:
-    """Refuse settings that the method does not know."""
-    from ..baselines.factory import settings_of
+    """Refuse settings that the method does not know, and another frame of the hand for what is no method of ours."""
+    from ..baselines.factory import OWN_TOOL, settings_of
 
     if is_own(cell.method):
+        if cell.tool is not None:
+            raise BadConfig(grid.blame("tool"), "tool", f"{cell.method} {OWN_TOOL}")
         return
     try:
         settings_of(cell.method, cell.settings)

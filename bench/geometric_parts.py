@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..baselines.sparse import DENSE
 from ..configs.shipped import shipped_demonstration
 from ..planner.arm import Arm
 from ..planner.body import Body
@@ -17,8 +18,6 @@ from ..planner.segment import resampled
 from ..planner.shapes import Box, Cylinder, Shape
 
 ROBOT = "Panda"
-STEP = 0.005
-"""Screw length [m] between the poses of a segment: what the policies' programs take."""
 TILTING = np.deg2rad(5.0)
 """Tilt of the held object [rad] at which a demonstrated pour begins."""
 POURING, SLACK = np.deg2rad(60.0), np.deg2rad(5.0)
@@ -73,7 +72,7 @@ class Part:
         carried = demonstration.segment(kind.segment)
         standing = _upright(grasp.reference_pose)
         self.name, self.kind = name, kind
-        self.shown = resampled(demonstration.segment_path(kind.segment), STEP)
+        self.shown = resampled(demonstration.segment_path(kind.segment), DENSE)
         self.tcp_from_object = demonstration.path[grasp.stop].inverse() @ grasp.reference_pose
         x, y, z = (float(extent) for extent in demonstration.object_sizes[grasp.reference])
         self.shape = kind.shape or Box((x, y, z))

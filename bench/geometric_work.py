@@ -19,14 +19,15 @@ import numpy as np
 from ..baselines.geometric import leg_planner, made_path
 from ..baselines.makers import straight_path
 from ..baselines.mover import LegPlanner
-from ..planner import dualquat as dq
+from ..baselines.sparse import Join, filled
 from ..planner.errors import NotFinite, NotUnit, OneDemoError, PlanFailed
 from ..planner.pose import Pose, PosePath
+from ..planner.segment import key_poses
 from ..planner.shapes import Obstacle
 from ..planner.tsia import GUIDE_START, guide_index, imitated_path, screw_path
 from . import geometric_metrics as metrics
 from .geometric_clear import ToolJudge
-from .geometric_parts import STEP, Part, holding, part_named, robot, tool_of
+from .geometric_parts import Part, holding, part_named, robot, tool_of
 from .geometric_suite import GeometricSuite, Scenario, drawn, read_suite
 from .worker import main
 
@@ -45,7 +46,6 @@ FRAMES = ("tool", "tool, guide by length", "world", "recorded elsewhere")
 """What is changed: the tool frame, with the same guiding pose or with the one that its own length gives; all of the
 world; or the world of the demonstration alone, as if it had been recorded on another table."""
 ELSEWHERE = Pose.from_yaw([0.3, 0.5, 0.0], np.deg2rad(70.0))
-LINEAR, SCREW = "lerp + slerp", "screws"
 
 
 class Method(NamedTuple):
@@ -54,30 +54,30 @@ class Method(NamedTuple):
     Attributes:
         maker: the policy whose path maker it is.
         guide: fraction at which its blend ends.
-        fill: how it reads the way between key poses.
+        join: how it reads the way between key poses.
         planned: the path is that of an arm whose motion was planned; else that of a tool that flies freely.
     """
 
     maker: str
     guide: float = GUIDE_START
-    fill: str = LINEAR
+    join: Join = straight_path
     planned: bool = False
 
 
 METHODS = {
-    "screw": Method("screw", fill=SCREW, planned=True),
-    "repet": Method("screw", fill=SCREW),
-    "tsia": Method("tsia", fill=SCREW),
-    "tsia, guide 0.5": Method("tsia", SHIPPED_GUIDE, SCREW),
+    "screw": Method("screw", join=screw_path, planned=True),
+    "repet": Method("screw", join=screw_path),
+    "tsia": Method("tsia", join=screw_path),
+    "tsia, guide 0.5": Method("tsia", SHIPPED_GUIDE, screw_path),
     "decoupled": Method("decoupled"),
     "replay": Method("replay"),
     "dmp-goal": Method("dmp-goal"),
-    "dmp-goal, screws": Method("dmp-goal", fill=SCREW),
+    "dmp-goal, screws": Method("dmp-goal", join=screw_path),
     "dmp-world": Method("dmp-world"),
-    "potential": Method("potential", fill=SCREW),
+    "potential": Method("potential", join=screw_path),
     "rrt": Method("rrt", planned=True),
 }
-"""By name: `screw` is the whole method, `repet` imitation with escape trees alone; fills matter where key poses are
+"""By name: `screw` is the whole method, `repet` imitation with escape trees alone; joins matter where key poses are
 few."""
 TRACKS = {
     "paths": tuple(name for name in METHODS if name != "dmp-goal, screws"),
@@ -103,8 +103,8 @@ def path_row(scenario: Scenario, variant: str, name: str) -> Row:
 def sparse_row(scenario: Scenario, variant: str, name: str) -> Row:
     """The numbers of a path that was made from so many key poses, against the whole demonstration."""
     part = part_named(scenario.part)
-    keys = thinned(part.shown, int(variant))
-    return measured(scenario, name, filled(keys, METHODS[name].fill), aligned_from=COMMON)
+    keys = key_poses(part.shown, int(variant))
+    return measured(scenario, name, filled(keys, METHODS[name].join), aligned_from=COMMON)
 
 
 def frames_row(scenario: Scenario, variant: str, name: str) -> Row:
@@ -208,26 +208,6 @@ def numbers(part: Part, path: PosePath, goal: Pose, aligned_from: float) -> Row:
     }
     finite = {key: None if value is None or math.isnan(value) else value for key, value in values.items()}
     return {"reached": metrics.is_reached(distance, angle), **finite}
-
-
-def thinned(path: PosePath, count: int) -> PosePath:
-    """So many poses at equal steps of a path's screw length, both ends included."""
-    lengths = path.lengths()
-    wanted = np.linspace(0.0, lengths[-1], count)
-    left = np.clip(np.searchsorted(lengths, wanted, side="right") - 1, 0, len(path) - 2)
-    tau = (wanted - lengths[left]) / (lengths[left + 1] - lengths[left])
-    poses = dq.sclerp(path.dqs[left], path.dqs[left + 1], np.clip(tau, 0.0, 1.0))
-    poses[0], poses[-1] = path.dqs[0], path.dqs[-1]
-    return PosePath(poses)
-
-
-def filled(keys: PosePath, how: str) -> PosePath:
-    """Key poses joined by screws, or by straight lines with slerp, in steps like those of a dense demonstration."""
-    join = screw_path if how == SCREW else straight_path
-    out = keys[:1]
-    for k in range(len(keys) - 1):
-        out = out.joined(join(keys[k], keys[k + 1], STEP))
-    return out
 
 
 def _reason(failure: OneDemoError) -> str:

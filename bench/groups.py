@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..configs.cell import BESIDE, RunConfig
+from ..configs.cell import BESIDE, LATER, RunConfig
 from ..configs.nested import leaves
 from .escaping import plain
 from .methods import REFERENCE, place_of
@@ -30,7 +31,7 @@ SAFE, UNSAFE = "safe success", "unsafe success"
 
 
 class Setting(NamedTuple):
-    """What methods are compared on."""
+    """What methods are compared on; the level with what else must be said of it."""
 
     task: str
     robot: str
@@ -130,7 +131,7 @@ def groups_of(run: Run) -> list[Group]:
 
 
 def _setting(cell: RunConfig) -> Setting:
-    return Setting(cell.task, cell.robot, cell.level)
+    return Setting(cell.task, cell.robot, cell.condition)
 
 
 def _differing(cell: RunConfig, others: list[RunConfig]) -> str:
@@ -143,7 +144,7 @@ def _differing(cell: RunConfig, others: list[RunConfig]) -> str:
 
 def _written(cell: RunConfig) -> dict[str, Any]:
     """What decides how episodes go, by keys with dots; settings without their common beginning."""
-    values = cell.model_dump(mode="json", exclude={*BESIDE, "settings"}, exclude_defaults=True)
+    values = cell.model_dump(mode="json", exclude={*BESIDE, *LATER, "settings"}, exclude_defaults=True)
     return dict(sorted([*leaves(values), *leaves(cell.settings)]))
 
 
@@ -155,16 +156,19 @@ def groups_by_task(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:
     return found
 
 
-def place_of_setting(setting: Setting) -> tuple[int, str, str, int, str]:
+def place_of_setting(setting: Setting) -> tuple[int | str, ...]:
     """Sorting key."""
     tasks = list(TASKS)
     task = tasks.index(setting.task) if setting.task in tasks else len(tasks)
     return (task, setting.task, setting.robot, *rank(setting.level))
 
 
-def rank(level: str) -> tuple[int, str]:
-    """Sorting key of a level."""
-    return (ORDERED.index(level) if level in ORDERED else len(ORDERED), level)
+def rank(level: str) -> tuple[int, str, int, str]:
+    """Sorting key of a level; the more key poses the sooner."""
+    name, _, rest = level.partition(" ")
+    count = re.match(r"\d+", rest)
+    place = ORDERED.index(name) if name in ORDERED else len(ORDERED)
+    return place, name, -int(count[0]) if count else 0, rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,10 +244,10 @@ def metric_tests(groups: list[Group]) -> list[MetricTest]:
 
 
 def _opponents(groups: list[Group]) -> list[tuple[Group, Group]]:
-    """The reference and each other method that was run on scenarios drawn alike."""
+    """The reference and each other method that was run on scenarios drawn alike, and was shown as much."""
     found = []
-    for place in dict.fromkeys(drawn_from(group.cell) for group in groups):
-        here = [group for group in groups if drawn_from(group.cell) == place]
+    for place in dict.fromkeys((drawn_from(group.cell), group.setting) for group in groups):
+        here = [group for group in groups if (drawn_from(group.cell), group.setting) == place]
         ours = sorted((g for g in here if g.cell.method == REFERENCE), key=lambda g: len(g.cell.settings))
         found += [(ours[0], group) for group in here if ours and group is not ours[0]]
     return found

@@ -7,7 +7,9 @@ the loopback address; a cluster's address is used only if the user gives one.
 from __future__ import annotations
 
 import os
+import re
 import signal
+import socket
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -21,6 +23,11 @@ from .worker import answered, one_thread
 from .workshop import Bench, Workshop
 
 LOOPBACK = "127.0.0.1"
+FORM = re.compile(r"(?:ray://)?(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[^\s:/\[\]]+)):(?P<port>\d{1,5})")
+FOUND_BY_RAY = ("auto", "local")
+"""Addresses that name no machine: Ray itself looks for a cluster on this one."""
+PATIENCE = 5.0
+"""Seconds in which a cluster must answer: Ray would ask for minutes."""
 
 
 class Actor:
@@ -63,12 +70,14 @@ class RayActors:
         workshop: what works in them.
 
     Raises:
-        BadConfig: Ray is not installed, or there is no such cluster.
+        BadConfig: Ray is not installed, the address is none, or there is no such cluster.
     """
 
     def __init__(self, address: str | None, workers: int, log: Path | None = None, workshop: type[Workshop] = Bench):
         self._ray, self._local, self._workshop, self._log = _imported(), address is None, workshop, log
         options: dict[str, Any] = {"address": address}
+        if address is not None:
+            check_reachable(address)
         if self._local:
             options = {"num_cpus": workers, "num_gpus": 0, "include_dashboard": False, "_node_ip_address": LOOPBACK}
         options |= {"log_to_driver": False, "logging_level": "ERROR", "runtime_env": {"env_vars": one_thread()}}
@@ -117,6 +126,29 @@ class RayActors:
                 with self._log.open("a", encoding="utf-8") as file:
                     file.write(f"{error}\n")
             return None
+
+
+def check_reachable(address: str, seconds: float = PATIENCE) -> None:
+    """Refuse an address at which nothing listens.
+
+    Args:
+        address: as `ray.init` takes it.
+        seconds: to wait for an answer of each of the machine's addresses.
+
+    Raises:
+        BadConfig: it is not of a form that Ray knows, or nobody answers.
+    """
+    if address in FOUND_BY_RAY:
+        return
+    found = FORM.fullmatch(address)
+    if not found or not 0 < int(found["port"]) < 2**16:
+        reason = f"{address!r} is not ray://HOST:PORT, HOST:PORT, {' or '.join(FOUND_BY_RAY)}"
+        raise BadConfig("Ray", "address", reason)
+    try:
+        socket.create_connection((found["six"] or found["name"], int(found["port"])), seconds).close()
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise BadConfig("Ray", "address", f"no cluster at {address}: {reason}") from None
 
 
 def _imported() -> Any:

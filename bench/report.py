@@ -142,7 +142,8 @@ CAPTIONS = {
 def _opening(run: Run, groups: list[Group]) -> list[Block]:
     missing = sum(max(0, group.planned - len(group.records)) for group in groups)
     cells = list(run.cells.values())
-    words = {"tasks": [c.task for c in cells], "levels": [c.level for c in cells], "methods": [g.label for g in groups]}
+    conditions, labels = [cell.condition for cell in cells], [group.label for group in groups]
+    words = {"tasks": [cell.task for cell in cells], "levels": conditions, "methods": labels}
     items = [
         *(f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in words.items()),
         "Success is judged by the simulator; safe success is success without any unwanted contact.",

@@ -29,7 +29,7 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
         "method": config.method,
         "task": config.task,
         "robot": config.robot,
-        "level": config.level,
+        "level": config.condition,
         "episodes": len(records),
         "successes": successes,
         "safe_successes": sum(record.safe_success for record in records),

@@ -16,6 +16,7 @@ What the user got wrong, or must know, is answered by {"refused": text, "key": k
 from __future__ import annotations
 
 import logging
+import math
 import time
 import warnings
 from collections import OrderedDict
@@ -25,6 +26,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..configs.cell import RunConfig
 from ..planner.errors import BadConfig, BadOption, NoRoom, OneDemoError
+from ..planner.pose import Pose
 from .records import ERROR, EpisodeRecord, known_record
 from .run_folder import FIGURE, VIDEO
 from .scenarios import Scenario, ScenarioChanged, scenarios_of
@@ -128,7 +130,7 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
     import gymnasium as gym
 
     from .. import envs  # noqa: F401  (registers the ids)
-    from ..planner import reactive
+    from ..baselines.warm import warm_up_for
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -141,9 +143,7 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
             max_episode_steps=action_limit(config),
             **config.env,
         )
-    task = env.unwrapped.task
-    for arm, body in zip(task.arms, task.bodies, strict=True):
-        reactive.warm_up(arm, body)
+    warm_up_for(env.unwrapped.task)
     return env
 
 
@@ -152,7 +152,11 @@ def policy_for(env: Any, config: RunConfig) -> Policy:
     from ..baselines.factory import make_policy
     from .checks import fitting_demonstration
 
-    return make_policy(config.method, env.unwrapped.task, fitting_demonstration(config), config.settings)
+    shown, tool = fitting_demonstration(config), None
+    if config.tool is not None:
+        *position, turn = config.tool
+        tool = Pose.from_yaw(position, math.radians(turn))
+    return make_policy(config.method, env.unwrapped.task, shown, config.settings, key_poses=config.key_poses, tool=tool)
 
 
 def draw(env: Any, config: RunConfig, index: int) -> Answer:
@@ -248,7 +252,7 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
     finally:
         env.close()
     among = "" if config.obstacles in (None, "none") else f", obstacles {config.obstacles}"
-    where = f"{config.task}, {config.robot}, {config.level}{among}"
+    where = f"{config.task}, {config.robot}, {config.condition}{among}"
     title = f"{where}, seed {config.seed}: one demonstration, {config.method}"
     draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
     return {"speed": seen.speed, "video": config.video, "video_problem": seen.video_problem}

@@ -7,14 +7,27 @@ import json
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 Values = Annotated[list[Any], Field(min_length=1, max_length=1000)]
+Meters = Annotated[float, Field(ge=-1, le=1)]
+Degrees = Annotated[float, Field(ge=-360, le=360)]
 Condition = Annotated[dict[str, Any], Field(min_length=1)]
 BESIDE = ("name", "video", "trajectories", "episodes")
 """Keys that do not decide how an episode goes."""
+IMPLIED: dict[str, dict[str, Any]] = {"S": {"key_poses": 6}, "T": {"tool": (0.1, 0.0, 0.0, 90.0)}}
+"""What a level says of the run where the cell does not."""
+LATER = ("key_poses", "tool")
+"""Keys that are written, and decide, only where they have a value."""
 
 
 def digest_of(value: Any) -> str:
@@ -36,6 +49,10 @@ class RunConfig(BaseModel):
         robot: robosuite's name.
         seed: scenario k has the seed `seed + k`.
         obstacles: their kind; None: what the level says.
+        key_poses: how many of each segment of the demonstration are shown to the method; None: all of it is, at level
+            S 6 are.
+        tool: x, y, z [m] and turn about z [deg] of another frame in the tcp's, in which the method moves the hand;
+            None: the tcp's own, at level T [0.1, 0, 0, 90].
         env: more arguments of the environment, like `n_blocks` of stacking.
         max_seconds: simulated time limit of an episode; None: the task's own.
         video: make videos: of the first failure of each kind, and of the first episode where there is a single cell.
@@ -54,11 +71,36 @@ class RunConfig(BaseModel):
     robot: str = "Panda"
     seed: Annotated[int, Field(ge=0, le=2**31)] = 0
     obstacles: str | None = None
+    key_poses: Annotated[int, Field(ge=2, le=10_000)] | None = None
+    tool: Annotated[tuple[Meters, Meters, Meters, Degrees], Field(strict=False)] | None = None
     env: dict[str, Any] = Field(default_factory=dict)
     max_seconds: Annotated[float, Field(gt=0, le=3600)] | None = None
     video: bool = True
     trajectories: bool = False
     settings: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_what_the_level_implies(cls, values: Any) -> Any:
+        level = values.get("level") if isinstance(values, dict) else None
+        implied = IMPLIED.get(level, {}) if isinstance(level, str) else {}
+        return {**values, **{key: value for key, value in implied.items() if values.get(key) is None}}
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_asked_for(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # a cell without these has the digest that it had before there were any
+        return {key: value for key, value in written(self).items() if value is not None or key not in LATER}
+
+    @property
+    def condition(self) -> str:
+        """The level, with what else must be said of it: "S 6" of six key poses."""
+        implied = IMPLIED.get(self.level, {})
+        words = [self.level]
+        if self.key_poses is not None:
+            words.append(f"{self.key_poses}" if "key_poses" in implied else f"{self.key_poses} key poses")
+        if self.tool is not None and self.tool != implied.get("tool"):
+            words.append("tool " + " ".join(f"{value:g}" for value in self.tool))
+        return " ".join(words)
 
     def digest(self) -> str:
         """Twelve hexadecimal digits of all that decides how an episode goes: all but `BESIDE`."""

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..planner.errors import BadConfig
-from .cell import CELL_KEYS, RUN_KEYS, Default, RunConfig, RunSettings, digest_of, reason_of, unknown_key
+from .cell import CELL_KEYS, LATER, RUN_KEYS, Default, RunConfig, RunSettings, digest_of, reason_of, unknown_key
 from .loader import COMMAND_LINE, load_mapping, with_overrides
 from .nested import MISSING, at, having, leaves, merged, without
 
@@ -55,7 +55,8 @@ class Grid:
         """What a cell is, in words: task, robot, level, method, and what else is swept."""
         values = cell.model_dump(mode="json")
         more = [key for key in self.settings.sweep if key not in NAMING]
-        named = [f"{key}={_worded(at(values, key))}" for key in more]
+        found = {key: at(values, key) for key in more}
+        named = [f"{key}={_worded(value)}" for key, value in found.items() if not (value is MISSING and key in LATER)]
         return " ".join([*(values[key] for key in NAMING), *named])
 
     def blame(self, key: str) -> str | Path:

@@ -36,7 +36,8 @@ LEVELS = {
     "S": Level("L1"),
     "T": Level("L1"),
 }
-"""R is L1 on another robot, S with a sparser demonstration, T with another tool frame: choices of the run, not here."""
+"""R is L1 on another robot, S with a few key poses of the demonstration, T with the hand moved in another frame: starts
+and goals are those of L1, the rest is the run's to do (the keys `robot`, `key_poses` and `tool` of its cells)."""
 
 
 def level_named(name: object) -> Level:

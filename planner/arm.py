@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +90,13 @@ class Arm:
         x, jacobian = np.empty(8), np.empty((6, self.dof))
         forward_jacobian_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), jacobian, x)
         return x, jacobian
+
+    def with_tool(self, tcp_from_tool: Pose) -> Arm:
+        """The same arm with another frame of the hand as its tcp."""
+        row = self.chain[-1]
+        tool = Pose.from_position_quaternion(row[4:7], row[:4]) @ tcp_from_tool
+        chain = np.vstack([self.chain[:-1], [*tool.quaternion, *tool.position, row[7]]])
+        return replace(self, chain=chain)
 
     def margin(self, q: ArrayLike) -> float:
         """Smallest distance [rad or m] of q (dof,) to a joint limit; negative outside."""

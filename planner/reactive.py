@@ -28,7 +28,7 @@ from .repet import MAX_OBSTACLES
 from .safety import BLOCKED as UNSAFE
 from .safety import FREE, safe_velocity
 from .scene_work import Layout, SceneWork
-from .shapes import Obstacle, Sphere
+from .shapes import Obstacle
 from .workspace import PURSUIT, bound
 
 BLOCKING = ("start in collision", "goal in collision", "no escape found", "node limit reached")
@@ -116,6 +116,10 @@ class ReactivePlanner:
         self._why_not = "", ""
         self._plan_now = bool(self._obstacles) and not strictly
         self.state = FOLLOWING
+
+    def follow(self, plan: Plan, *, loosely: bool = False) -> None:
+        """Follow the path of a plan to its end; see `go`."""
+        self.go(plan.path, loosely=loosely)
 
     def stop(self) -> None:
         """No leg: stand still, retreating from what comes too close."""
@@ -310,21 +314,3 @@ class ReactivePlanner:
         """The wanted contacts of what is there now."""
         names = {obstacle.name for obstacle in obstacles}
         return [pair for pair in self._allowed if pair[0] in self.body.names and pair[1] in names]
-
-
-def warm_up(arm: Arm, body: Body) -> None:
-    """Compile, or load from the cache, what following among obstacles may need, so that no tick has to wait for it."""
-    q = 0.5 * (np.maximum(arm.lower, -1.0) + np.minimum(arm.upper, 1.0))
-    path = PosePath(arm.fk(q).dq[None])
-    things = (Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.0, 0.0, 50.0]), np.array([0.0, 0.0, 1e-3])),)
-    planner = ReactivePlanner(arm, body)
-    for seen in (things, (replace(things[0], velocity=np.zeros(3)),)):
-        planner.see(seen)
-        planner.go(path)
-        planner.step(q)
-        planner.see(tuple(obstacle.at(0.02) for obstacle in seen))
-        planner.step(q)
-    # what names what is in the way
-    scene = SceneWork.of(arm, body, things, planner.settings.plan)
-    scene.tightest(q)
-    scene.tightest_of_tool(path[0])

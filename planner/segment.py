@@ -54,6 +54,24 @@ def resampled(path: PosePath, step: float) -> PosePath:
     return PosePath(out)
 
 
+def key_poses(path: PosePath, count: int) -> PosePath:
+    """So many poses at equal steps of a path's screw length, on the screws between its own; both ends are kept.
+
+    Two of a path that stands still.
+    """
+    if count < 2:
+        raise BadOption("count", f"{count} is not a number of poses from 2 on")
+    lengths = path.lengths()
+    if lengths[-1] <= SAME:
+        return PosePath(path.dqs[[0, -1]])
+    wanted = np.linspace(0.0, lengths[-1], count)
+    left = np.clip(np.searchsorted(lengths, wanted, side="right") - 1, 0, len(path) - 2)
+    tau = (wanted - lengths[left]) / (lengths[left + 1] - lengths[left])
+    poses = dq.sclerp(path.dqs[left], path.dqs[left + 1], np.clip(tau, 0.0, 1.0))
+    poses[0], poses[-1] = path.dqs[0], path.dqs[-1]
+    return PosePath(poses)
+
+
 def trimmed(path: PosePath, radius: float) -> PosePath:
     """The path up to its first entry into a ball about its last position, then its last pose.
 

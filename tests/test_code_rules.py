@@ -72,6 +72,7 @@ PLANNER_ORDER = [
     "foresight",
     "reactive",
     "segment",
+    "warm",
     "demo",
     "demo_io",
     "recordings",
@@ -140,6 +141,8 @@ SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
 READERS = {"planner/models.py", "planner/body_models.py", "planner/judge_geometry.py"}
 ONE_FILE = {"robosuite": {"envs/table_model.py", "bench/perf.py"}, "pinocchio": {*READERS, "bench/peers.py"}}
 LEARNING = {"torch", "stable_baselines3", "sb3_contrib"}
+MAY_USE = {"bench/ray_actors.py": {"socket"}}
+"""Who may use what is banned: to ask whether a cluster that the user names is there."""
 BANNED_CALLS = {"eval", "exec", "compile", "__import__", "breakpoint"}
 BANNED_MODULES = {"pickle", "marshal", "shelve", "dill", "joblib", "random", "requests", "urllib", "socket"}
 
@@ -232,7 +235,8 @@ def test_heavy_libraries_are_touched_in_one_place(library):
 
 @each_source
 def test_nothing_loads_code_or_uses_global_randomness(path):
-    assert not BANNED_MODULES & {module for folder, module in imports_of(path) if folder == ""}
+    banned = BANNED_MODULES - MAY_USE.get(str(path.relative_to(ROOT)), set())
+    assert not banned & {module for folder, module in imports_of(path) if folder == ""}
     for node in ast.walk(tree_of(path)):
         if not isinstance(node, ast.Call):
             continue

@@ -10,10 +10,16 @@ from policies import LEARNED, PROGRAMS, installed
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
+from onedemo.baselines.sparse import DENSE
+from onedemo.baselines.tool_frame import ToolMover
+from onedemo.bench.geometric_metrics import curve_gap
 from onedemo.bench.tasks import TASKS
+from onedemo.bench.workshop import policy_for
+from onedemo.configs.cell import RunConfig
 from onedemo.configs.schema import load_config
 from onedemo.configs.shipped import shipped_config, shipped_demonstration
 from onedemo.planner.demo_io import load_demonstration
+from onedemo.planner.segment import key_poses, resampled
 
 TICKS = 100
 
@@ -54,3 +60,35 @@ def test_every_policy_takes_up_every_task(task_env, name):
 @pytest.mark.parametrize("name", LEARNED)
 def test_every_learned_policy_takes_up_every_task(task_env, name):
     taken_up(task_env, name, {"checkpoint": saved_actor(task_env[0], name)})
+
+
+def begun(env, policy):
+    """Actions (TICKS, ...) of the first two seconds, and the policy's words about them."""
+    state, actions, (observation, _) = None, [], env.reset(seed=1000, options={"level": "L1"})
+    for _ in range(TICKS):
+        action, state = policy.predict(observation, state)
+        actions.append(action)
+        observation, *_ = env.step(action)
+    return np.array(actions), policy.report(state)
+
+
+@pytest.mark.parametrize("name", installed("screw", "decoupled", "dmp-goal", "rrt"))
+def test_levels_s_and_t_are_what_they_are_called(task_env, name):
+    """A cell of these levels makes another policy of the same name, which takes up the task as well."""
+    env, config = task_env
+    values = {**config.model_dump(mode="json"), "method": name}
+    nominal, sparse, turned = (
+        policy_for(env, RunConfig.model_validate({**values, "level": level})) for level in ("L1", "S", "T")
+    )
+    assert turned.mover.__class__ is ToolMover
+    assert sparse.mover.__class__ is nominal.mover.__class__ is not ToolMover
+    for segment in sparse.demonstration.segments:
+        kept = nominal.demonstration.segment_path(segment.name)
+        path = resampled(key_poses(resampled(kept, DENSE), 6), DENSE)
+        assert curve_gap(path, sparse.demonstration.segment_path(segment.name)) < (0.02 if name != "screw" else 1e-6)
+    actions = {}
+    for level, policy in (("L1", nominal), ("S", sparse), ("T", turned)):
+        actions[level], report = begun(env, policy)
+        assert not report.failure_reason, report.detail
+    if name != "rrt":
+        assert not np.array_equal(actions["S"], actions["L1"]) and not np.array_equal(actions["T"], actions["L1"])

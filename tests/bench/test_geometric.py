@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from onedemo.baselines.makers import straight_path
+from onedemo.baselines.sparse import filled
 from onedemo.bench import geometric_metrics as metrics
 from onedemo.bench.console import console
 from onedemo.bench.geometric_clear import FAR, ToolJudge
@@ -18,19 +20,18 @@ from onedemo.bench.geometric_suite import FILE, LEVELS, GeometricSuite, cells, d
 from onedemo.bench.geometric_tables import is_kept
 from onedemo.bench.geometric_work import (
     METHODS,
-    SCREW,
     GeometricBench,
-    filled,
     frames_row,
     key_of,
     path_row,
     sparse_row,
-    thinned,
 )
 from onedemo.envs.rooms import tool_room
 from onedemo.planner.errors import BadConfig
 from onedemo.planner.pose import Pose, PosePath
+from onedemo.planner.segment import key_poses
 from onedemo.planner.shapes import Box, Obstacle, Sphere, pack
+from onedemo.planner.tsia import screw_path
 
 SEED = 5
 QUICK = ("tsia", "decoupled", "replay", "potential")
@@ -144,10 +145,10 @@ def test_free_ways_are_the_demonstrations_own(suite, name):
 
 def test_thinning_keeps_the_ends_and_filling_keeps_the_keys():
     shown = part_named("pour carry").shown
-    keys = thinned(shown, 6)
+    keys = key_poses(shown, 6)
     assert len(keys) == 6
-    for how in (SCREW, "lerp + slerp"):
-        path = filled(keys, how)
+    for join in (screw_path, straight_path):
+        path = filled(keys, join)
         assert np.array_equal(path.dqs[0], shown.dqs[0]) and np.array_equal(path.dqs[-1], shown.dqs[-1])
         assert metrics.curve_gap(keys, path) < 1e-12
 

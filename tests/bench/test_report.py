@@ -18,7 +18,7 @@ from example_runs import GOLDEN, changed, small_run, with_words
 
 from onedemo.bench.escaping import csv_text, markdown_text, plain, slug
 from onedemo.bench.files import sha256_of
-from onedemo.bench.groups import groups_of, metric_tests, success_tests
+from onedemo.bench.groups import groups_of, metric_tests, rank, success_tests
 from onedemo.bench.methods import LOOKS, look_of
 from onedemo.bench.records import ERROR, FILE, HUNG, WORKER_DIED, encoded, read_records
 from onedemo.bench.report import write_report, write_report_of
@@ -364,6 +364,26 @@ def test_two_cells_of_one_method_are_told_apart_and_compared(tmp_path):
     (test,) = success_tests(groups, lambda record: record.success)
     assert (test.label, test.pairs) == (groups[1].label, 3)
     assert test.only_other == 0
+
+
+def test_methods_are_compared_where_they_were_shown_as_much(tmp_path):
+    folder = small_run(tmp_path / "run", 3, levels=("S",), methods=("screw",))
+    few, method = {"key_poses": 4}, {"method": "decoupled"}
+    groups = with_cells(folder, few, {**few, **method}, method)
+    assert [(group.setting.level, group.label) for group in groups] == [
+        ("S 6", "screw"), ("S 6", "decoupled"), ("S 4", "screw"), ("S 4", "decoupled"),
+    ]  # fmt: skip
+    tests = success_tests(groups, lambda record: record.success)
+    assert [(test.setting.level, test.label, test.pairs) for test in tests] == [
+        ("S 6", "decoupled", 3), ("S 4", "decoupled", 3),
+    ]  # fmt: skip
+    text = write_report(folder)[0].read_text(encoding="utf-8")
+    assert "| stack S 4 |" in text and "levels: S 4, S 6" in text
+
+
+def test_levels_are_in_the_order_of_tables():
+    levels = ["T", "S 4", "L3 12 key poses", "S 12", "L1", "S 6", "F", "L3"]
+    assert sorted(levels, key=rank) == ["L1", "L3 12 key poses", "L3", "F", "S 12", "S 6", "S 4", "T"]
 
 
 def test_cells_that_share_a_setting_only_in_name_are_not_compared(tmp_path):

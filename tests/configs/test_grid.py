@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onedemo.configs.cell import CELL_KEYS, RUN_KEYS, json_schema
+from onedemo.configs.cell import CELL_KEYS, RUN_KEYS, RunConfig, json_schema
 from onedemo.configs.nested import MISSING, at, having, leaves, merged, without
 from onedemo.configs.schema import load_config, load_grid
 from onedemo.configs.shipped import FOLDER
@@ -124,7 +124,48 @@ def test_a_cell_is_called_by_what_tells_it_from_the_others(tmp_path):
     assert len(set(labels)) == 8
 
 
+def test_cells_that_were_run_before_keep_their_digests():
+    """A key that came later must not make old runs foreign."""
+    headline = load_grid(FOLDER / "bench" / "headline.yaml")
+    assert (headline.digest(), len(headline.cells)) == ("8831db9b385a", 130)
+    found = {(cell.task, cell.level, cell.method): cell.digest() for cell in headline.cells}
+    assert found["stack", "L1", "screw"] == "e251194fd285"
+    assert load_config(FOLDER / "bench" / "shelve_paper.yaml").digest() == "7bf59e1ce1cb"
+    values = headline.cells[0].model_dump(mode="json")
+    assert not {"key_poses", "tool"} & set(values)
+    assert RunConfig.model_validate({**values, "key_poses": None, "tool": None}) == headline.cells[0]
+
+
+def test_levels_s_and_t_say_what_is_shown_and_in_which_frame(tmp_path):
+    sparse, turned = grid(tmp_path, BASE + "sweep: {level: [S, T]}\n").cells
+    assert (sparse.key_poses, sparse.tool, sparse.condition) == (6, None, "S 6")
+    assert (turned.key_poses, turned.tool, turned.condition) == (None, (0.1, 0.0, 0.0, 90.0), "T")
+    one = grid(tmp_path, BASE + "level: S\nkey_poses: 6\n").cells[0]
+    assert one.digest() == sparse.digest()
+    other = grid(tmp_path, BASE + "level: T\ntool: [0, 0, 0.05, -30]\n").cells[0]
+    assert other.condition == "T tool 0 0 0.05 -30" and other.digest() != turned.digest()
+    assert RunConfig.model_validate(json.loads(json.dumps(other.model_dump(mode="json")))) == other
+    far = grid(tmp_path, BASE + "level: L3\nkey_poses: 12\n").cells[0]
+    assert far.condition == "L3 12 key poses" and far.digest() != grid(tmp_path, BASE + "level: L3\n").cells[0].digest()
+
+
+def test_key_poses_are_swept_and_named(tmp_path):
+    text = BASE + "sweep: {level: [L1, S], key_poses: [null, 4, 6]}\n"
+    text += "exclude: [{level: L1, key_poses: [4, 6]}, {level: S, key_poses: null}]\n"
+    found = grid(tmp_path, text)
+    assert [found.label(cell) for cell in found.cells] == [
+        "stack Panda L1 screw", "stack Panda S screw key_poses=4", "stack Panda S screw key_poses=6",
+    ]  # fmt: skip
+
+
 BAD = {
+    "one key pose": (BASE + "key_poses: 1\n", "key_poses: .*greater than or equal to 2, got 1"),
+    "a tool far away": (BASE + "tool: [2, 0, 0, 0]\n", "tool.0: .*less than or equal to 1, got 2"),
+    "a tool of three": (BASE + "tool: [0, 0, 0]\n", "tool.3: is missing"),
+    "a sparse level twice": (
+        BASE + "level: S\nsweep: {key_poses: [null, 6]}\n",
+        "sweep: gives the same cell twice: key_poses=6",
+    ),
     "unknown axis": (BASE + "sweep: {levl: [L1]}\n", "sweep.levl: unknown key; did you mean 'level'\\? allowed: task"),
     "axis of a name": (BASE + "sweep: {name: [a, b]}\n", "sweep.name: unknown key; .*allowed: task"),
     "no list": (BASE + "sweep: {level: L1}\n", "sweep.level: input should be a valid list, got 'L1'"),

@@ -11,6 +11,7 @@ import pytest
 from arms import joints, panda, panda_urdf, random_arm
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import random_dq
 
 from onedemo.planner import dualquat as dq
 from onedemo.planner.arm import Arm
@@ -122,6 +123,22 @@ def test_the_jacobian_is_the_derivative_of_the_pose(seed, dof):
     q, direction, h = joints(arm, rng), rng.normal(size=dof), 1e-6
     step = dq.mul(dq.conj(arm.fk(q - h * direction).dq), arm.fk(q + h * direction).dq)
     np.testing.assert_allclose(dq.twist_from_dq(step) / (2 * h), arm.jacobian(q) @ direction, atol=1e-7)
+
+
+@few
+@given(st.integers(0, 10**6), st.integers(3, 9))
+def test_another_tool_is_the_same_arm_seen_from_elsewhere(seed, dof):
+    rng = np.random.default_rng(seed)
+    arm, tool = random_arm(seed, dof), Pose(random_dq(rng))
+    q, other = joints(arm, rng), arm.with_tool(tool)
+    distance, angle = other.fk(q).gap(arm.fk(q) @ tool)
+    assert distance < 1e-12 and angle < 1e-7
+    h, direction = 1e-6, rng.normal(size=dof)
+    step = other.fk(q - h * direction).inverse() @ other.fk(q + h * direction)
+    np.testing.assert_allclose(dq.twist_from_dq(step.dq) / (2 * h), other.jacobian(q) @ direction, atol=1e-6)
+    np.testing.assert_array_equal(other.limits, arm.limits)
+    back = other.with_tool(tool.inverse())
+    np.testing.assert_allclose(back.fk(q).matrix, arm.fk(q).matrix, atol=1e-12)
 
 
 def test_the_margin_is_the_nearest_limit():

@@ -23,7 +23,7 @@ from onedemo.planner.command import (
 from onedemo.planner.errors import BadOption
 from onedemo.planner.joint_leg import STRAY, strayed
 from onedemo.planner.pose import Pose
-from onedemo.planner.reactive import ReactivePlanner, warm_up
+from onedemo.planner.reactive import ReactivePlanner
 from onedemo.planner.scene_work import SceneWork
 from onedemo.planner.shapes import Box, Obstacle, Sphere
 from onedemo.planner.tsia import screw_path
@@ -204,10 +204,6 @@ def test_loosely_is_less_than_exactly():
 def test_absurd_settings_are_refused(change):
     with pytest.raises(BadOption):
         replace(ReactiveSettings(), **change)
-
-
-def test_warming_up_needs_no_more_than_an_arm_and_its_body():
-    warm_up(*robot())
 
 
 # Strictly along the path
