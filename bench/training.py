@@ -168,7 +168,7 @@ def evaluated(config: TrainConfig, actor: Actor, env: Any) -> tuple[tuple[bool, 
 
 
 def _leg_seed(seed: int, leg: int) -> int:
-    return int(np.random.SeedSequence([seed, leg]).generate_state(1)[0] % 2**31)
+    return int(np.random.default_rng([seed, leg]).integers(2**31))
 
 
 def _seed_all(seed: int, leg: int) -> None:
