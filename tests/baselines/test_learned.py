@@ -160,5 +160,5 @@ def test_around_the_screw_policy_only_joints_are_commanded(env, joints):
         AroundScrew(env, DEMONSTRATION)
     with pytest.raises(BadOption, match="'scale': has 1 entries"):
         AroundScrew(joints, DEMONSTRATION, (0.1,))
-    with pytest.raises(BadOption, match="control_mode"):
+    with pytest.raises(BadActor, match=r"control\.mode: is 'joint_velocity'; wanted is 'ee_twist'"):
         made(env, METHOD, saved_actor(joints, METHOD))
