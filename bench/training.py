@@ -168,7 +168,8 @@ def evaluated(config: TrainConfig, actor: Actor, env: Any) -> tuple[tuple[bool, 
 
 
 def _leg_seed(seed: int, leg: int) -> int:
-    return int(np.random.default_rng([seed, leg]).integers(2**31))
+    rng = np.random.default_rng([seed, leg])
+    return int(rng.integers(2**31))
 
 
 def _seed_all(seed: int, leg: int) -> None:
