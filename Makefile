@@ -7,9 +7,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 FOLDERS := envs planner baselines configs bench tests
+LEARNING := $(addprefix tests/,bench/test_training.py bench/test_hindsight.py baselines/test_export.py baselines/test_learned.py \
+    baselines/test_learning_page.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lint types check perf soak study docs bodies beads clean
+.PHONY: help demo test learn slow lint types check perf soak study docs bodies beads clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -29,11 +31,19 @@ $(VENV)/.developed: pyproject.toml constraints.txt | $(BIN)/python
 	@$(PIP) install --quiet --editable '.[dev]' --constraint constraints.txt
 	@touch $@ $(VENV)/.installed
 
+$(VENV)/.learned: $(VENV)/.developed
+	@echo "installing what training needs (some minutes)"
+	@$(PIP) install --quiet --editable '.[dev,rl]' --constraint constraints.txt
+	@touch $@
+
 demo: $(VENV)/.installed ## stack three blocks from one demonstration: report, figure, video
 	@$(BIN)/onedemo run configs/bench/stack.yaml
 
 test: $(VENV)/.developed ## run the tests
 	@$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
+
+learn: $(VENV)/.learned ## install torch and Stable-Baselines3 too, run the tests of training
+	@$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadscope $(LEARNING)
 
 slow: $(VENV)/.developed ## run the long tests too, on newly drawn values
 	@$(BIN)/python -m pytest --hypothesis-profile=default -n 2 --dist loadfile
