@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..baselines.own_policy import is_own
 from ..configs.cell import RunConfig
 from ..configs.schema import Grid
+from ..configs.training import TrainConfig
 from ..planner.errors import BadConfig, BadDemonstration
 from .tasks import TASKS
 
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 
 OWN_KEYS = ("robot", "level", "obstacles", "render_mode")
 """Arguments of environments that are keys of a config themselves."""
+
+
+CHOSEN = ("reward", "goal_form", "end_on_success", "control_mode")
+"""Arguments of environments that the algorithm of a training chooses."""
 
 
 def check_grid(grid: Grid) -> None:
@@ -61,6 +66,10 @@ def _check_name(source: str | Path, key: str, value: Any, known: dict[str, Itera
 
 
 def _check_arguments(cell: RunConfig, grid: Grid) -> None:
+    _check_env(cell, grid.blame("env"))
+
+
+def _check_env(cell: RunConfig, source: str | Path) -> None:
     """Refuse arguments that the environment does not know."""
     import gymnasium as gym
     from gymnasium.envs.registration import load_env_creator
@@ -75,7 +84,7 @@ def _check_arguments(cell: RunConfig, grid: Grid) -> None:
     for key in cell.env:
         if key not in known:
             reason = f"{name} has no such argument; allowed: {', '.join(known) or 'none'}"
-            raise BadConfig(grid.blame("env"), f"env.{key}", reason)
+            raise BadConfig(source, f"env.{key}", reason)
 
 
 def _check_settings(cell: RunConfig, grid: Grid) -> None:
@@ -90,6 +99,31 @@ def _check_settings(cell: RunConfig, grid: Grid) -> None:
         key = f"settings.{error.key}" if error.key else "settings"
         reason = f"{error.reason} (of the method {cell.method!r})"
         raise BadConfig(grid.blame("settings"), key, reason) from None
+
+
+def check_training(config: TrainConfig) -> None:
+    """Refuse a training that cannot be: its names, its arguments, its demonstration.
+
+    Raises:
+        BadConfig: an unknown name or argument.
+        BadDemonstration: the demonstration is of something else.
+    """
+    from ..baselines.task_episodes import EPISODES
+    from .learners import chosen
+
+    known = known_names()
+    for key in ("task", "level", "robot"):
+        _check_name(config.name, key, getattr(config, key), known)
+    cell = RunConfig(name=config.name, task=config.task, demonstration=config.demonstration, env=config.env)
+    _check_env(cell, config.name)
+    if config.task not in EPISODES:
+        reason = f"{config.task} is no task of one object; allowed: {', '.join(sorted(EPISODES))}"
+        raise BadConfig(config.name, "task", reason)
+    for key in CHOSEN:
+        if key in config.env:
+            raise BadConfig(config.name, f"env.{key}", "is chosen by the algorithm")
+    fitting_demonstration(cell)
+    chosen(config)
 
 
 def fitting_demonstration(cell: RunConfig) -> Demonstration:

@@ -59,6 +59,31 @@ def run(
 
 
 @app.command()
+def train(
+    config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped training, like reach_sac.")],
+    overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Where folders are made.")] = Path("trainings"),
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the folder, and errors.")] = False,
+) -> None:
+    """Train a learner on a task from several seeds, and write its curves and its best actor.
+
+    Keys: name, task, algorithm (sac, ppo, sac-her, sac-demo, bc, residual), demonstration, steps, seeds, seed,
+    evaluate_every, evaluate_episodes, level, robot, env, learner, executor, workers, address, wall_seconds, device.
+
+    Everything is kept up to the last evaluation, whatever happens: the same command goes on, also with more steps or
+    seeds, and ends with the same curve. The last line on standard output is the folder. Needs the extra rl.
+
+    Examples:
+    - onedemo train reach_sac
+
+    - onedemo train place_demo steps=400000 learner.batch_size=512
+    """
+    from .train import run_training
+
+    raise typer.Exit(run_training(config, overrides or [], output, quiet=quiet))
+
+
+@app.command()
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of the same scenarios.")],
     output: Annotated[

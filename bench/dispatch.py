@@ -43,7 +43,7 @@ class Executor(Protocol):
     workers: int
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """The outcomes, as they come."""
+        """The outcomes, as they come. To a deque, jobs may be added while outcomes come; it is emptied."""
         ...
 
     def __enter__(self) -> Executor: ...
@@ -104,13 +104,13 @@ class Dispatcher:
     Args:
         crew: of what kind the workers are.
         workers: how many at most.
-        wall_seconds: real time of an episode after which its worker counts as hung.
+        wall_seconds: real time of an episode, or of a leg of a training, after which its worker counts as hung.
         build_seconds: the same for everything else.
     """
 
     def __init__(self, crew: Crew, workers: int, wall_seconds: float, build_seconds: float = BUILD_SECONDS):
         self.crew, self.workers = crew, workers
-        self._limits = {"episode": wall_seconds}
+        self._limits: dict[str, float] = {"episode": wall_seconds, "train": wall_seconds}
         self._build_seconds = build_seconds
         self._desks: list[_Desk] = []
 
@@ -129,33 +129,34 @@ class Dispatcher:
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
         """The outcomes, as they come."""
-        waiting = deque(_Task(job) for job in jobs)
-        while waiting or any(desk.task for desk in self._desks):
-            self._give_out(waiting)
-            yield from self._take_in(waiting)
+        new, again = jobs if isinstance(jobs, deque) else deque(jobs), deque[_Task]()
+        while new or again or any(desk.task for desk in self._desks):
+            self._give_out(new, again)
+            yield from self._take_in(again)
 
-    def _give_out(self, waiting: deque[_Task]) -> None:
+    def _give_out(self, new: deque[Job], again: deque[_Task]) -> None:
+        """Give jobs to idle workers, first those that were lost with one."""
         for desk in self._desks:
-            if waiting and desk.task is None:
-                self._begin(desk, waiting.popleft())
-        while waiting and len(self._desks) < self.workers:
+            if (new or again) and desk.task is None:
+                self._begin(desk, again.popleft() if again else _Task(new.popleft()))
+        while (new or again) and len(self._desks) < self.workers:
             desk = _Desk(self.crew.hire())
             self._desks.append(desk)
-            self._begin(desk, waiting.popleft())
+            self._begin(desk, again.popleft() if again else _Task(new.popleft()))
 
     def _begin(self, desk: _Desk, task: _Task) -> None:
         task.attempts += 1
         desk.task, desk.preparing, desk.begun = task, task.job["kind"] != "prepare", time.monotonic()
         self.crew.ask(desk.worker, {"kind": "prepare", "cell": task.job["cell"]} if desk.preparing else task.job)
 
-    def _take_in(self, waiting: deque[_Task]) -> Iterator[Outcome]:
+    def _take_in(self, again: deque[_Task]) -> Iterator[Outcome]:
         busy = {id(desk.worker): desk for desk in self._desks if desk.task}
         soonest = min(desk.begun + self._limit(desk) for desk in busy.values()) - time.monotonic()
         answers = self.crew.heard([desk.worker for desk in busy.values()], max(0.0, soonest))
         for worker, answer in answers:
             desk = busy.pop(id(worker))
             if answer is None:
-                yield from self._lost(desk, WORKER_DIED, waiting)
+                yield from self._lost(desk, WORKER_DIED, again)
             elif desk.preparing and not ({"refused", "crash"} & set(answer)):
                 desk.preparing, desk.begun = False, time.monotonic()
                 assert desk.task
@@ -166,20 +167,20 @@ class Dispatcher:
                 yield Outcome(task.job, answer, "", time.monotonic() - desk.begun)
         for desk in busy.values():
             if time.monotonic() - desk.begun >= self._limit(desk):
-                yield from self._lost(desk, HUNG, waiting)
+                yield from self._lost(desk, HUNG, again)
 
     def _limit(self, desk: _Desk) -> float:
         assert desk.task
         kind = "prepare" if desk.preparing else desk.task.job["kind"]
         return self._limits.get(kind, self._build_seconds)
 
-    def _lost(self, desk: _Desk, reason: str, waiting: deque[_Task]) -> Iterator[Outcome]:
+    def _lost(self, desk: _Desk, reason: str, again: deque[_Task]) -> Iterator[Outcome]:
         """Replace a worker; give its job out once more, or give it up."""
         self.crew.end(desk.worker)
         self._desks.remove(desk)
         task = desk.task
         assert task
         if task.attempts < ATTEMPTS:
-            waiting.appendleft(task)
+            again.appendleft(task)
         else:
             yield Outcome(task.job, None, reason, time.monotonic() - desk.begun)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..configs.cell import RunSettings
 from .dispatch import Dispatcher, Executor, Job, Outcome
@@ -13,12 +15,16 @@ from .workshop import Bench
 
 
 class Serial:
-    """An executor in this process: nothing is limited in time, and what kills an episode kills the run."""
+    """An executor in this process: nothing is limited in time, and what kills an episode kills the run.
+
+    Args:
+        workshop: what does the jobs; None: that of episodes.
+    """
 
     workers = 1
 
-    def __init__(self) -> None:
-        self._bench = Bench()
+    def __init__(self, workshop: Any = None) -> None:
+        self._bench = workshop or Bench()
 
     def __enter__(self) -> Serial:
         return self
@@ -28,8 +34,9 @@ class Serial:
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
         """The outcomes, in order."""
-        for job in jobs:
-            begun = time.monotonic()
+        waiting = jobs if isinstance(jobs, deque) else deque(jobs)
+        while waiting:
+            job, begun = waiting.popleft(), time.monotonic()
             yield Outcome(job, self._bench.do(job), "", time.monotonic() - begun)
 
 

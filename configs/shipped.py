@@ -34,6 +34,15 @@ def shipped_config(name: str) -> Path:
     return _shipped("config", "bench", ".yaml", name)
 
 
+def shipped_training(name: str) -> Path:
+    """File of a training config that comes with the package, like "reach_sac".
+
+    Raises:
+        UnknownName: there is none of that name; the message lists them.
+    """
+    return _shipped("training", "train", ".yaml", name)
+
+
 def shipped_actor(name: str) -> Path:
     """The .json of an actor that comes with the package, like "sac-stack-Panda".
 

@@ -1,0 +1,156 @@
+"""`onedemo train`: a config in, learning curves and actors out; interrupted trainings go on where they stopped."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections import deque
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from ..configs.shipped import shipped_training
+from ..configs.training import TrainConfig, load_training
+from ..planner.errors import BadConfig
+from .comparison import WorkerFailed
+from .console import console, labeled
+from .dispatch import Dispatcher, Executor, Job
+from .environment import fingerprint
+from .executors import Serial, cores
+from .files import write_whole
+from .run_folder import LOG, open_folder
+from .training_folder import SEED, curve_of, seeds_of, write_curves
+
+INTERRUPTED, DISK_FULL = 130, 3
+CONFIG = "config.json"
+
+
+def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
+    """Train and write the folder; returns the exit code.
+
+    Args:
+        config: a file, or the name of a shipped config.
+        overrides: `key=value` changes.
+        output: where the folder is made.
+        quiet: print only the folder, and errors.
+
+    Raises:
+        BadConfig: the config, an override or the demonstration cannot be used.
+        MissingExtra: torch or Stable-Baselines3 is not installed.
+        RunBusy: another process writes into the same folder.
+    """
+    chosen = load_training(_path(config), overrides)
+    check(chosen)
+    folder = output / f"{chosen.name}-{chosen.digest()}"
+    err = console(stderr=True, quiet=quiet)
+    try:
+        with ExitStack() as held:
+            open_folder(folder, held)
+            _describe(chosen, folder, shlex.join(["onedemo", "train", config, *overrides]))
+            with _executor(chosen, folder) as executor:
+                train(chosen, folder, executor, err)
+            lines = write_curves(chosen, folder)
+    except KeyboardInterrupt:
+        err.print(f"stopped; all is kept in {folder} up to the last evaluations, the same command goes on")
+        return INTERRUPTED
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        text = f"{folder}: {reason}; what was evaluated is kept, the same command goes on"
+        console(stderr=True).print(labeled("error", "red", text))
+        return DISK_FULL
+    out = console(quiet=quiet)
+    for line in lines:
+        out.print(line)
+    console().print(str(folder))
+    return 0
+
+
+def check(config: TrainConfig) -> None:
+    """Refuse what cannot be trained, before anything is built.
+
+    Raises:
+        BadConfig: an unknown name, argument or setting.
+        MissingExtra: the extra is not installed.
+    """
+    from ..baselines.extras import needed
+    from .checks import check_training
+    from .learners import EXTRA
+
+    needed("torch", EXTRA)
+    needed("stable_baselines3", EXTRA)
+    check_training(config)
+
+
+def train(config: TrainConfig, folder: Path, executor: Executor, err: Any) -> None:
+    """Run the legs that are missing, the seeds side by side.
+
+    Raises:
+        BadConfig: what a worker refuses.
+        WorkerFailed: workers die, or cannot do their work.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    waiting: deque[Job] = deque()
+    done = {seed: len(curve_of(folder, seed)) for seed in seeds_of(config)}
+    for seed, legs in done.items():
+        if legs < config.legs:
+            waiting.append(_job(config, folder, seed, legs + 1))
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=err, transient=True) as bars:
+        total = config.legs * config.seeds
+        bar = bars.add_task("evaluations", total=total, completed=sum(min(n, config.legs) for n in done.values()))
+        for outcome in executor.results(waiting):
+            seed, leg = outcome.job["seed"], outcome.job["leg"]
+            point = _point(config, outcome)
+            success = sum(point["successes"]) / len(point["successes"])
+            average = sum(point["returns"]) / len(point["returns"])
+            err.print(f"seed {seed}, {point['steps']} steps: {success:.0%} succeed, return {average:.1f}")
+            bars.update(bar, advance=1)
+            if leg < config.legs:
+                # the same worker takes it: it has this learner in memory
+                waiting.appendleft(_job(config, folder, seed, leg + 1))
+
+
+def _point(config: TrainConfig, outcome: Any) -> dict[str, Any]:
+    answer = outcome.answer
+    if answer is None:
+        raise WorkerFailed(f"{config.name}, seed {outcome.job['seed']}: the worker {outcome.lost}, twice; see {LOG}")
+    if "crash" in answer:
+        raise WorkerFailed(f"{config.name}: {answer['crash']}; see {LOG}")
+    if "refused" in answer:
+        raise BadConfig(config.name, answer["key"], answer["refused"])
+    return answer["point"]
+
+
+def _job(config: TrainConfig, folder: Path, seed: int, leg: int) -> Job:
+    own = str((folder / SEED.format(seed)).resolve())
+    return {"kind": "train", "cell": config.model_dump(mode="json"), "seed": seed, "leg": leg, "folder": own}
+
+
+def _executor(config: TrainConfig, folder: Path) -> Executor:
+    from .train_worker import Gym
+
+    if config.executor == "serial":
+        return Serial(Gym())
+    workers = max(1, min(config.workers or cores(), config.seeds))
+    if config.executor == "process":
+        from .processes import Processes
+
+        crew: Any = Processes(folder / LOG, (sys.executable, "-m", "onedemo.bench.train_worker"))
+    else:
+        from .ray_actors import RayActors
+
+        crew = RayActors(config.address, workers, folder / LOG, Gym)
+    return Dispatcher(crew, workers, config.wall_seconds)
+
+
+def _path(config: str) -> Path:
+    path = Path(config)
+    return path if path.exists() else shipped_training(path.stem if path.suffix in ("", ".yaml") else config)
+
+
+def _describe(config: TrainConfig, folder: Path, command: str) -> None:
+    """Write what the training is."""
+    write_whole(folder / CONFIG, json.dumps(config.model_dump(mode="json"), indent=1) + "\n")
+    write_whole(folder / "environment.json", json.dumps({**fingerprint(), "command": command}, indent=2) + "\n")

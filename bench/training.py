@@ -1,0 +1,186 @@
+"""One seed of a training, leg by leg: what a leg begins with is on the disk, so that any process may go on.
+
+A leg is `evaluate_every` steps and an evaluation. Each begins with an environment that is reset and with all sources
+of randomness seeded from (seed, leg): a training that was killed and goes on has the same curve, to the bit.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..baselines.actor import Actor, Training
+from ..baselines.actor_io import save_actor
+from ..baselines.export import actor_of
+from ..configs.training import TrainConfig
+from ..planner.errors import BadConfig
+from .cloning import Clone
+from .learner_state import load_state, save_state
+from .learners import chosen, demo_transitions, made_model
+from .train_env import base_env, features_of, seen_env, shown
+from .training_points import LEG, NUMBERS, Point, last_leg, numbers_of, points_of
+
+DEMONSTRATIONS = {"sac-demo": 1, "bc": 1, "residual": 1}
+
+
+class Trainee:
+    """A learner of one seed in this process.
+
+    Args:
+        config: of the training.
+        seed: of it.
+        folder: of this seed.
+    """
+
+    def __init__(self, config: TrainConfig, seed: int, folder: Path):
+        import torch
+
+        # small networks are no faster with more, and sums would depend on their number
+        torch.set_num_threads(1)
+        self.config, self.seed, self.folder = config, seed, folder
+        env = seen_env(config)
+        self.features, self.normalization = features_of(env, config)
+        self._task, self._scale = env.unwrapped.task, getattr(env, "scale", ())
+        env.close()
+        self._evaluation = base_env(config, reward="dense", end_on_success=True)
+        _seed_all(seed, 0)
+        self.model = self._made()
+        self.points = [] if (last := last_leg(folder)) is None else self._loaded(last)
+
+    def run_leg(self) -> Point:
+        """Train and evaluate once more, and keep what came of it."""
+        begun, before = time.perf_counter(), self.points[-1].seconds if self.points else 0.0
+        leg = len(self.points) + 1
+        self._train(leg)
+        actor = self.actor()
+        successes, returns = evaluated(self.config, actor, self._evaluation)
+        steps = int(self.model.num_timesteps)
+        seconds = before + time.perf_counter() - begun
+        point = Point(self.seed, leg, steps, successes, returns, round(seconds, 3))
+        self.points.append(point)
+        self._keep()
+        return point
+
+    def actor(self) -> Actor:
+        """What has been learned so far."""
+        config, last = self.config, self.points[-1] if self.points else None
+        training = Training(
+            config.algorithm,
+            steps=int(self.model.num_timesteps),
+            seed=self.seed,
+            demonstrations=DEMONSTRATIONS.get(config.algorithm, 0),
+            success=None if last is None else last.success,
+            episodes=0 if last is None else len(last.successes),
+            seconds=0.0 if last is None else last.seconds,
+        )
+        return actor_of(
+            self.model.network if config.algorithm == "bc" else self.model,
+            self._task,
+            method=config.algorithm,
+            features=self.features,
+            normalization=self.normalization,
+            residual_scale=self._scale,
+            config_hash=config.digest(),
+            training=training,
+        )
+
+    def _made(self) -> Any:
+        config = self.config
+        if config.algorithm != "bc":
+            return made_model(config, self.features, self.normalization)
+        before, _, actions, *_ = demo_transitions(config, self.features, self.normalization)
+        return Clone(before, actions, chosen(config), config.device)
+
+    def _train(self, leg: int) -> None:
+        _seed_all(self.seed, leg)
+        if self.config.algorithm == "bc":
+            self.model.learn(self.config.evaluate_every)
+            return
+        from stable_baselines3.common.logger import configure
+
+        events = self.folder / "tensorboard" / f".{leg}"
+        self.model.set_logger(configure(str(events), ["tensorboard"]))
+        self.model.set_random_seed(_leg_seed(self.seed, leg))
+        self.model._last_obs = None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if hasattr(getattr(self.model, "replay_buffer", None), "truncate_last_trajectory"):
+                self.model.replay_buffer.truncate_last_trajectory()
+            self.model.learn(self.config.evaluate_every, reset_num_timesteps=False, log_interval=10)
+        self.model.logger.close()
+        for file in events.iterdir():
+            file.replace(events.parent / f"{file.name}.{leg}")
+        events.rmdir()
+
+    def _keep(self) -> None:
+        """Write state and actor; the leg before is forgotten once this one is whole."""
+        leg = len(self.points)
+        target = self.folder / LEG.format(leg)
+        part = target.with_name(f".{target.name}")
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        points = [asdict(point) for point in self.points]
+        save_state(self.model, part, {"digest": self.config.digest(), "points": points})
+        save_actor(self.actor(), part / "actor")
+        _on_disk(part)
+        shutil.rmtree(target, ignore_errors=True)
+        part.replace(target)
+        for old in self.folder.glob("leg-*"):
+            if old != target:
+                shutil.rmtree(old)
+
+    def _loaded(self, last: Path) -> list[Point]:
+        digest = numbers_of(last)["digest"]
+        if digest != self.config.digest():
+            reason = f"is of the config {digest}, not of {self.config.digest()}: begin in another --output"
+            raise BadConfig(last / NUMBERS, "digest", reason)
+        return points_of(load_state(self.model, last))
+
+
+def evaluated(config: TrainConfig, actor: Actor, env: Any) -> tuple[tuple[bool, ...], tuple[float, ...]]:
+    """Successes and returns of an actor on the frozen scenarios: seeds from 0 on, as in a comparison."""
+    from ..baselines.learned import LearnedPolicy
+    from ..baselines.residual import ResidualPolicy
+
+    if config.algorithm == "residual":
+        policy: Any = ResidualPolicy.by(env.unwrapped.task, shown(config), actor)
+    else:
+        policy = LearnedPolicy.by(actor)
+    successes, returns = [], []
+    limit = env.spec.max_episode_steps
+    for seed in range(config.evaluate_episodes):
+        observation, info = env.reset(seed=seed)
+        state, total, steps, over = None, 0.0, 0, False
+        while not over:
+            action, state = policy.predict(observation, state)
+            observation, reward, terminated, truncated, info = env.step(action)
+            total, steps, over = total + float(reward), steps + 1, terminated or truncated
+        successes.append(bool(info["success"]))
+        returns.append(round(total + (limit - steps if info["success"] else 0), 6))
+    return tuple(successes), tuple(returns)
+
+
+def _leg_seed(seed: int, leg: int) -> int:
+    return int(np.random.SeedSequence([seed, leg]).generate_state(1)[0] % 2**31)
+
+
+def _seed_all(seed: int, leg: int) -> None:
+    from stable_baselines3.common.utils import set_random_seed
+
+    set_random_seed(_leg_seed(seed, leg))
+
+
+def _on_disk(folder: Path) -> None:
+    for path in (*folder.iterdir(), folder):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
