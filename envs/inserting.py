@@ -74,7 +74,8 @@ class InsertOneEnv(SubTask[ShelveProgress], ShelveEnv):
     | `obstacle_pose` | (3, 7) | 0 |
     | `obstacle_velocity` | (3, 3) | 0 |
 
-    With `goal_form=True` it is `observation` (all of the above in one vector), `achieved_goal` and `desired_goal`
+    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
+    `achieved_goal` and `desired_goal`
     (8,): the book's pose, and 1 if it is let go and the hand is 15 cm away, else 0; its slot and 1.
     `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
 

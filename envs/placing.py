@@ -77,7 +77,8 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     | `obstacle_pose` | (3, 7) | the obstacles |
     | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
 
-    With `goal_form=True` it is `observation` (all of the above in one vector), `achieved_goal` and `desired_goal`
+    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
+    `achieved_goal` and `desired_goal`
     (8,): the block's pose, and 1 if it is let go and the hand is 5 cm away, else 0; its place and 1.
     `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
 

@@ -63,7 +63,8 @@ class ReachEnv(SubTask[ReachProgress]):
     | `obstacle_pose` | (3, 7) | the obstacles |
     | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
 
-    With `goal_form=True` it is `observation` (all of the above in one vector), `achieved_goal` and `desired_goal`
+    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
+    `achieved_goal` and `desired_goal`
     (7,): the tcp's pose and its place; `reward="sparse"` is 1 within the tolerances.
     `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
 

@@ -22,6 +22,8 @@ FREQUENCY = 20
 """Of actions [Hz]."""
 HORIZON = 150
 """Actions of an episode."""
+TOLD_BY_GOALS = ("goal_pose", "motion_index")
+"""Entries that say what is desired, or whether it is reached: they would contradict goals that are exchanged."""
 
 
 class Agreement(NamedTuple):
@@ -55,8 +57,10 @@ class SubTask(OneDemoEnv[Judged]):
         if goal_form:
             bound = np.array(self.TOLERANCES)
             goal = space.box(-bound, bound, bound.shape)
-            self._whole_space = self.observation_space
-            flat: Any = flatten_space(self._whole_space)
+            whole: Any = self.observation_space
+            seen = {key: entry for key, entry in whole.spaces.items() if key not in TOLD_BY_GOALS}
+            self._seen_space = gym.spaces.Dict(seen)
+            flat: Any = flatten_space(self._seen_space)
             parts: dict[str, gym.Space[Any]] = {"observation": flat, "achieved_goal": goal, "desired_goal": goal}
             self.observation_space: Any = gym.spaces.Dict(parts)
 
@@ -109,9 +113,9 @@ class SubTask(OneDemoEnv[Judged]):
         whole = super()._observation(state)
         if not self.goal_form:
             return whole
-        flat = flatten(self._whole_space, whole)
+        seen = {key: value for key, value in whole.items() if key not in TOLD_BY_GOALS}
         return {
-            "observation": np.asarray(flat),
+            "observation": np.asarray(flatten(self._seen_space, seen)),
             "achieved_goal": self.achieved_goal(state),
             "desired_goal": self.desired_goal(),
         }

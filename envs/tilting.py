@@ -82,7 +82,8 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
     | `obstacle_pose` | (3, 7) | 0 |
     | `obstacle_velocity` | (3, 3) | 0 |
 
-    With `goal_form=True` it is `observation` (all of the above in one vector), `achieved_goal` and `desired_goal`
+    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
+    `achieved_goal` and `desired_goal`
     (2,): the shares of the beads in the target and outside both glasses; 1 and 0.
     `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
 
