@@ -2,7 +2,7 @@
 
 | in the folder | what |
 |---|---|
-| `reproduce.md` | results, figures, and what agrees with the paper |
+| `reproduce.md`, `reproduce.html` | results, figures, and what agrees with the paper; the second is whole in itself |
 | `times.csv`, `trees.csv` | the times |
 | `figures/`, `videos/` | of the first seed of each experiment |
 | `runs/` | run folders, see `run_folder` |
@@ -27,7 +27,7 @@ from ..planner.errors import BadConfig
 from .console import COMMAND_LINE, console
 from .experiments import EXPERIMENTS, Drawing, Experiment, experiments_named
 from .files import write_whole
-from .reproduce_report import PAGE, Finished, write_page
+from .reproduce_report import Finished, write_page
 from .run import run_config
 from .run_folder import FIGURE, VIDEO, written_json
 
@@ -63,8 +63,9 @@ def reproduce(names: Iterable[str], output: Path, *, episodes: int | None = None
     seconds = time.perf_counter() - start
     found = [done for each in EXPERIMENTS if (done := finished(each, output, episodes)) is not None]
     loads = (load, os.getloadavg()[0])
-    write_page(output, found, f"{seconds / 60.0:.1f} minutes, load {loads[0]:.1f} to {loads[1]:.1f}")
-    console().print(str(output / PAGE))
+    pages = write_page(output, found, f"{seconds / 60.0:.1f} minutes, load {loads[0]:.1f} to {loads[1]:.1f}")
+    for page in pages:
+        console().print(str(page))
     return 0
 
 
@@ -85,8 +86,9 @@ def finished(each: Experiment | Drawing, output: Path, episodes: int | None) -> 
     """What an experiment gave, its pictures put beside the page; None if it has not been done."""
     if isinstance(each, Drawing):
         rows = written_json(output, TREES).get("rows")
-        pictures = tuple(f"{FIGURES}/{each.name}_{scene}.png" for scene in each.scenes)
-        return Finished(each, rows, pictures, "") if rows else None
+        pictures = [f"{FIGURES}/{each.name}_{scene}.png" for scene in each.scenes]
+        there = tuple(picture for picture in pictures if (output / picture).is_file())
+        return Finished(each, rows, there, "") if rows else None
     folder = run_folder_of(each, output, episodes)
     rows = written_json(folder, "summary.json").get("rows")
     if not rows:

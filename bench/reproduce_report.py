@@ -9,11 +9,21 @@ from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from .document import Block, Code, Document, Entry, Heading, Link, Paragraph, Picture, Pictures, Table
 from .environment import fingerprint
 from .experiments import Drawing, Experiment
 from .files import write_whole
+from .html_page import html_of
+from .markdown_page import markdown_of
 
-PAGE = "reproduce.md"
+PAGE, HTML = "reproduce.md", "reproduce.html"
+OPENING = (
+    "Each task from ONE demonstration, no training. Success is judged by the simulator. The intervals are Wilson's "
+    "(95 %); a handful of seeds shows the order of size only. The paper reports no success rates."
+)
+TREES_SAID = (
+    "Mean +- standard deviation of the processor's time; the whole plan once, by the clock. The table: trees.csv."
+)
 LEVEL_MS, LEVEL_MS_STD, LOOP_MS = 0.0429, 0.0109, 0.1
 """What the paper prints, in C++: a level of the tree, and an upper bound of a loop of the controller [ms]."""
 TIMES = ("experiment", "episodes", "tick_us_median", "tick_us_p99", "tick_us_max", "motion_s_median", "motion_s_max")
@@ -40,8 +50,8 @@ class Finished(NamedTuple):
     video: str
 
 
-def write_page(output: Path, found: Sequence[Finished], took: str) -> None:
-    """Write the page and the tables of times.
+def write_page(output: Path, found: Sequence[Finished], took: str) -> list[Path]:
+    """Write the page, as Markdown and as HTML, and the tables of times; the two pages.
 
     Args:
         output: the folder.
@@ -52,52 +62,56 @@ def write_page(output: Path, found: Sequence[Finished], took: str) -> None:
     trees = [each for each in found if isinstance(each.experiment, Drawing)]
     write_whole(output / "times.csv", _csv(TIMES, [time_row(each) for each in runs]))
     write_whole(output / "trees.csv", _csv(TREE_TIMES, [tree_row(row) for each in trees for row in each.rows]))
-    parts = [
-        "# The paper's experiments, reproduced",
-        "Each task from ONE demonstration, no training. Success is judged by the simulator. The intervals are Wilson's "
-        "(95 %); a handful of seeds shows the order of size only. The paper reports no success rates.",
-        results_table(runs) if runs else "",
-        *(_section(each) for each in found),
-        _times(runs) if runs else "",
-        f"Made on {_machine()}. The last command took {took}; what was finished before was not run again.",
+    document = Document("The paper's experiments, reproduced", [Paragraph(OPENING)])
+    document.blocks += [
+        *([results_table(runs)] if runs else []),
+        *(block for each in found for block in _section(each, output)),
+        *(_times(runs) if runs else []),
+        Paragraph(f"Made on {_machine()}. The last command took {took}; what was finished before was not run again."),
     ]
-    write_whole(output / PAGE, "\n\n".join(part for part in parts if part) + "\n")
+    pages = [output / PAGE, output / HTML]
+    for page, text in zip(pages, (markdown_of(document), html_of(document)), strict=True):
+        write_whole(page, text)
+    return pages
 
 
-def results_table(runs: Sequence[Finished]) -> str:
+def results_table(runs: Sequence[Finished]) -> Table:
     """A line for each experiment."""
-    head = ("experiment", "success", "Wilson 95 %", "no unwanted contact", "obstacle touched", "nearest [mm]", "error")
-    rows = []
+    head = ["experiment", "success", "Wilson 95 %", "no unwanted contact", "obstacle touched", "nearest [mm]", "error"]
+    rows: list[list[Entry]] = []
     for each in runs:
         row = each.rows[0]
         interval = f"{row['wilson_low']:.2f} to {row['wilson_high']:.2f}"
-        among = row["clearance_mm_min"] is not None
-        rows.append((
-            each.experiment.title, f"{row['successes']} of {row['episodes']}", interval, row["safe_successes"],
-            f"{row['touching']} of {row['episodes']}" if among else "-", _said(row["clearance_mm_min"]),
-            f"{row['error']}: {_said(row['error_max'])}",
-        ))  # fmt: skip
-    return _table(head, rows)
+        touched = "-" if row["clearance_mm_min"] is None else f"{row['touching']} of {row['episodes']}"
+        rows.append([
+            each.experiment.title, f"{row['successes']} of {row['episodes']}", interval, str(row["safe_successes"]),
+            touched, _said(row["clearance_mm_min"]), f"{row['error']}: {_said(row['error_max'])}",
+        ])  # fmt: skip
+    return Table(head, rows)
 
 
-def _section(each: Finished) -> str:
+def _section(each: Finished, output: Path) -> list[Block]:
     experiment = each.experiment
     sentence = trees_agree(each.rows) if isinstance(experiment, Drawing) else run_agrees(each.rows[0])
-    pictures = [f"![{experiment.title}]({picture})" for picture in each.pictures]
     colors = ["Blue: the demonstration.", "Magenta: the final paths."]
     if isinstance(experiment, Drawing):
         colors += ["Cyan: the collision-free path.", "Green: every tangent plane of the last tree."]
     else:
         among = each.rows[0]["clearance_mm_min"] is not None
         colors += ["Cyan: led round what nobody showed."] if among else []
-        colors += [f"Dashed: as executed. `onedemo run {experiment.config} {' '.join(experiment.overrides)}`"]
-    film = f"Video of the first seed: [{each.video}]({each.video})" if each.video else ""
-    table = _tree_table(each.rows) if isinstance(experiment, Drawing) else ""
-    lines = [
-        f"## {experiment.title}", f"Paper: {experiment.paper}", f"{sentence} Differs: {experiment.here}.",
-        *pictures, " ".join(colors) if pictures else "", table, film,
-    ]  # fmt: skip
-    return "\n\n".join(line for line in lines if line)
+        colors += ["Dashed: as executed."]
+    shown = [Picture(file, (output / file).read_bytes(), experiment.title, "png") for file in each.pictures]
+    blocks: list[Block] = [
+        Heading(2, experiment.title),
+        Paragraph(f"Paper: {experiment.paper}"),
+        Paragraph(f"{sentence} Differs: {experiment.here}."),
+        *([Pictures(shown, " ".join(colors))] if shown else []),
+    ]
+    if isinstance(experiment, Drawing):
+        return [*blocks, _tree_table(each.rows), Paragraph(TREES_SAID)]
+    film = Table(["video", "file"], [["the first seed", Link(each.video, each.video)]])
+    command = Code(f"onedemo run {experiment.config} {' '.join(experiment.overrides)}")
+    return [*blocks, *([film] if each.video else []), command]
 
 
 def run_agrees(row: Row) -> str:
@@ -131,42 +145,36 @@ def trees_agree(rows: Sequence[Row]) -> str:
     )
 
 
-def _tree_table(rows: Sequence[Row]) -> str:
-    head = ("scene", "planes", "levels", "a plane [us]", "a detour [ms]", "a detour, per level [ms]", "whole plan [ms]")
-    lines = []
+def _tree_table(rows: Sequence[Row]) -> Table:
+    head = ["scene", "planes", "levels", "a plane [us]", "a detour [ms]", "a detour, per level [ms]", "whole plan [ms]"]
+    lines: list[list[Entry]] = []
     for row in rows:
         plane = _spread(*(1e3 * value for value in row["plane_ms"]))
         detour, level = _spread(*row["detour_ms"]), _spread(*row["detour_level_ms"])
-        lines.append((row["scene"], row["planes"], row["levels"], plane, detour, level, f"{row['plan_ms']:.1f}"))
-    return (
-        _table(head, lines)
-        + "\n\nMean +- standard deviation of the processor's time; the whole plan once, by the clock. "
-        "The table: `trees.csv`."
-    )
+        numbers = [str(row["planes"]), str(row["levels"]), plane, detour, level, f"{row['plan_ms']:.1f}"]
+        lines.append([row["scene"], *numbers])
+    return Table(head, lines)
 
 
-def _times(runs: Sequence[Finished]) -> str:
+def _times(runs: Sequence[Finished]) -> list[Block]:
     """Planner's time and motion's time, kept apart."""
-    head = ("experiment", "tick, median [us]", "tick, p99 [us]", "longest [ms]", "motion, median [s]", "longest [s]")
-    rows = []
+    head = ["experiment", "tick, median [us]", "tick, p99 [us]", "longest [ms]", "motion, median [s]", "longest [s]"]
+    rows: list[list[Entry]] = []
     for each in runs:
         row = each.rows[0]
-        rows.append((
-            each.experiment.name, _said(row["tick_us_median"]), _said(row["tick_us_p99"]),
-            _said(None if row["tick_us_max"] is None else 1e-3 * row["tick_us_max"]), _said(row["seconds_median"]),
-            _said(row["seconds_max"]),
-        ))  # fmt: skip
+        longest = None if row["tick_us_max"] is None else 1e-3 * row["tick_us_max"]
+        numbers = (row["tick_us_median"], row["tick_us_p99"], longest, row["seconds_median"], row["seconds_max"])
+        rows.append([each.experiment.name, *map(_said, numbers)])
     ticks = [1e-3 * each.rows[0]["tick_us_median"] for each in runs]
     below = sum(tick < LOOP_MS for tick in ticks)
-    return "\n\n".join([
-        "## Times",
-        _table(head, rows),
+    said = (
         f"The planner's time for each tick of 20 ms, by the clock, as called from Python; what else the machine does "
         "shows in it; in the longest one a motion is planned with all its symmetric goals. The motion's time is "
         f"simulated. The paper prints less than {LOOP_MS} ms for a loop, in C++; the median tick is below that in "
         f"{below} of {len(runs)} experiments. Some of the times in the paper's table have no unit, so they are not "
-        "compared. The table: `times.csv`.",
-    ])  # fmt: skip
+        "compared. The table: times.csv."
+    )
+    return [Heading(2, "Times"), Table(head, rows), Paragraph(said)]
 
 
 def time_row(each: Finished) -> Row:
@@ -189,11 +197,6 @@ def _csv(columns: Sequence[str], rows: Sequence[Row]) -> str:
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
 
 
 def _said(value: float | None) -> str:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
-import subprocess
 import threading
 from dataclasses import replace
-from html.parser import HTMLParser
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
 
 import numpy as np
 import pytest
 from example_runs import GOLDEN, changed, small_run, with_words
+from pages import Page, browse, needs_browser, needs_nothing_else, same_numbers, screenshot
 
 from onedemo.bench.escaping import csv_text, markdown_text, plain, slug
 from onedemo.bench.files import sha256_of
@@ -30,8 +27,6 @@ from onedemo.bench.statistics import holm, mcnemar
 from onedemo.bench.videos import Video, chosen, video_of, videos_in
 from onedemo.planner.errors import BadConfig
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed: apt install chromium")
 HOSTILE = [
     "<script>document.title = 'ours'</script>",
     "<img src=x onerror=\"document.title='ours'\">",
@@ -43,21 +38,6 @@ HOSTILE = [
 ]  # fmt: skip
 EMPTY = json.dumps({"version": 1, "suite": sha256_of([]), "scenarios": []})
 ODD = '{"version": 1, "run": "", "cells": [{"label": "", "config": {"name": "a", "task": "b", "episodes": true}}]}'
-
-
-class Page(HTMLParser):
-    """All tags with their attributes, and the text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.words = [], []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data):
-        self.words.append(data)
 
 
 @pytest.fixture(scope="module")
@@ -81,32 +61,13 @@ def test_a_report_written_again_has_the_same_bytes(run):
 
 def test_the_page_needs_nothing_besides_itself(run):
     text = (run / "report.html").read_text(encoding="utf-8")
-    page = Page(text)
-    assert {tag for tag, _ in page.tags} <= {
-        "html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li", "div", "table", "thead",
-        "tbody", "tr", "th", "td", "span", "i", "b", "figure", "figcaption", "img", "a", "pre", "code", "details",
-        "summary",
-    }  # fmt: skip
-    policy = next(each["content"] for tag, each in page.tags if each.get("http-equiv"))
-    assert "default-src 'none'" in policy
-    for _, attributes in page.tags:
-        assert not any(name.startswith("on") for name in attributes)
-        assert attributes.get("src", "data:image/svg+xml;base64,").startswith("data:image/svg+xml;base64,")
-        if "href" in attributes:
-            assert (run / attributes["href"]).is_file()
+    assert needs_nothing_else(Page(text), run)
     assert len(text) < 3_000_000
 
 
 def test_both_reports_hold_the_same_numbers(run):
-    page, text = (
-        Page((run / "report.html").read_text(encoding="utf-8")),
-        (run / "report.md").read_text(encoding="utf-8"),
-    )
-    words = set(page.words)
-    for line in text.splitlines():
-        if line.startswith("| ") and "---" not in line:
-            for cell in line.replace("\\|", "/").strip("| ").split(" | "):
-                assert cell.replace("\\", "") in words, cell
+    page = Page((run / "report.html").read_text(encoding="utf-8"))
+    assert same_numbers(page, (run / "report.md").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("words", HOSTILE, ids=range(len(HOSTILE)))
@@ -132,11 +93,6 @@ def test_words_of_others_stay_words(tmp_path, words):
     assert len(widths) == 1
     for row in csv.DictReader((folder / "episodes.csv").open(encoding="utf-8")):
         assert not row["detail"].startswith("=")
-
-
-def browse(page: Path, profile: Path, *options):
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", *options]
-    return subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=120)
 
 
 @needs_browser
@@ -174,17 +130,7 @@ def test_nothing_runs_and_nothing_is_asked_for_in_a_browser(tmp_path):
 @needs_browser
 @pytest.mark.parametrize("width, height", [(390, 844), (1280, 900)])
 def test_the_page_is_drawn_on_a_phone_and_on_a_desk(run, tmp_path, width, height):
-    from PIL import Image
-
-    picture = tmp_path / "page.png"
-    browse(
-        run / "report.html",
-        tmp_path / "profile",
-        f"--window-size={width},{height}",
-        f"--screenshot={picture}",
-        "--hide-scrollbars",
-    )
-    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    pixels = screenshot(run / "report.html", tmp_path, width, height)
     assert pixels.shape == (height, width, 3)
     colored = np.ptp(pixels, axis=2) > 40
     assert 0.001 < colored.mean() < 0.5, "bars and figures, on white"

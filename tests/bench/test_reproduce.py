@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import json
 from dataclasses import replace
@@ -10,12 +11,13 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from pages import Page, needs_browser, needs_nothing_else, same_numbers, screenshot
 
 from onedemo.bench import reproduce as command
 from onedemo.bench.checks import check_grid
 from onedemo.bench.experiments import EXPERIMENTS, Drawing, Experiment, experiments_named
 from onedemo.bench.reproduce import changes, draw_trees, finished, reproduce, run_folder_of
-from onedemo.bench.reproduce_report import LEVEL_MS, PAGE, results_table, run_agrees, trees_agree
+from onedemo.bench.reproduce_report import HTML, LEVEL_MS, PAGE, results_table, run_agrees, trees_agree, write_page
 from onedemo.bench.surfaces import surface
 from onedemo.bench.workshop import draw, made
 from onedemo.configs.scene import load_scene, shipped_scene
@@ -30,6 +32,13 @@ RUNS = [each for each in EXPERIMENTS if isinstance(each, Experiment)]
 ROW = {
     "successes": 9, "episodes": 10, "safe_successes": 9, "wilson_low": 0.6, "wilson_high": 0.98, "touching": 0,
     "clearance_mm_min": 12.34, "failures": {"blocked": 1}, "error": "largest position error [mm]", "error_max": 2.0,
+}  # fmt: skip
+
+
+TIMES = {"tick_us_median": 50.0, "tick_us_p99": 90.0, "tick_us_max": 9e4, "seconds_median": 7.0, "seconds_max": 8.0}
+TIMES_OF_A_TREE = {
+    "planes": 4, "levels": 3, "plane_ms": (0.1, 0.0), "detour_ms": (0.2, 0.1), "detour_level_ms": (0.3, 0.1),
+    "plan_ms": 9.0, "judged": True,
 }  # fmt: skip
 
 
@@ -94,8 +103,15 @@ def test_one_experiment_and_a_tree_end_to_end_and_again(tmp_path, monkeypatch, c
     monkeypatch.setattr("onedemo.bench.experiments.EXPERIMENTS", (quick, few))
     monkeypatch.setattr(command, "EXPERIMENTS", (quick, few))
     assert reproduce([], tmp_path, video=False) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / PAGE)
+    assert capsys.readouterr().out.splitlines()[-2:] == [str(tmp_path / PAGE), str(tmp_path / HTML)]
     text = (tmp_path / PAGE).read_text()
+    page = Page((tmp_path / HTML).read_text(encoding="utf-8"))
+    assert needs_nothing_else(page, tmp_path, "png")
+    assert [each["src"] for tag, each in page.tags if tag == "img"] == [
+        f"data:image/png;base64,{base64.b64encode((tmp_path / picture).read_bytes()).decode()}"
+        for picture in ("figures/bimanual.png", "figures/tree_sphere.png")
+    ]
+    assert same_numbers(page, text)
     assert "| From one arm to two | 1 of 1 |" in text or "| From one arm to two | 0 of 1 |" in text
     for picture in ("figures/bimanual.png", "figures/tree_sphere.png"):
         assert f"]({picture})" in text
@@ -183,9 +199,37 @@ def test_the_sentence_about_trees_compares_with_what_the_paper_prints():
 
 def test_the_table_tells_touching_from_nothing_to_touch():
     done = command.Finished(RUNS[0], [ROW], (), "")
-    assert "| 0 of 10 | 12.3 |" in results_table([done])
+    assert results_table([done]).rows[0][4:6] == ["0 of 10", "12.3"]
     free = command.Finished(RUNS[0], [{**ROW, "clearance_mm_min": None}], (), "")
-    assert "| - | - |" in results_table([free])
+    assert results_table([free]).rows[0][4:6] == ["-", "-"]
+
+
+@needs_browser
+@pytest.mark.parametrize("width, height", [(390, 844), (1280, 900)])
+def test_the_page_is_drawn_on_a_phone_and_on_a_desk(tmp_path, width, height):
+    (tmp_path / "figures").mkdir()
+    matplotlib.image.imsave(tmp_path / "figures" / "pour.png", np.full((300, 400, 3), (0, 96, 168), dtype=np.uint8))
+    _, page = write_page(tmp_path, [command.Finished(RUNS[0], [ROW | TIMES], ("figures/pour.png",), "")], "no time")
+    pixels = screenshot(page, tmp_path, width, height)
+    assert pixels.shape == (height, width, 3)
+    blue = (np.abs(pixels - (0, 96, 168)) < 8).all(axis=2)
+    assert blue.mean() > 0.02, "the figure"
+    assert (pixels.min(axis=2) < 100).mean() > 0.005, "letters"
+    assert (pixels[:, :8] > 240).all(), "a margin"
+
+
+def test_the_page_is_made_of_what_is_there(tmp_path):
+    """A picture that was taken away is left out; what others have written stays words."""
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "trees.json").write_text(json.dumps({"rows": [TIMES_OF_A_TREE | {"scene": "<b>x</b> | y"}]}))
+    done = finished(TREE, tmp_path, None)
+    assert done.pictures == ()
+    pages = write_page(tmp_path, [command.Finished(RUNS[0], [ROW | TIMES], (), "videos/pour.mp4"), done], "no time")
+    text, page = pages[0].read_text(encoding="utf-8"), Page(pages[1].read_text(encoding="utf-8"))
+    assert not {"b", "img"} & {tag for tag, _ in page.tags}
+    assert ("a", {"href": "videos/pour.mp4"}) in page.tags and "](videos/pour.mp4)" in text
+    assert "<b>x</b> | y" in page.words and "<b>x" not in text
+    assert "onedemo run pour level=L2 obstacles=none" in page.words
 
 
 @pytest.mark.parametrize("shape", [Box((0.1, 0.2, 0.3)), Sphere(0.1), Capsule(0.05, 0.2), Cylinder(0.1, 0.3)], ids=repr)
