@@ -8,6 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..baselines.extras import needed
+
+EXTRA = "rl"
+
 
 class Clone:
     """A network that is to act as was shown; least squares by Adam, over and over the same transitions.
@@ -20,8 +24,7 @@ class Clone:
     """
 
     def __init__(self, before: np.ndarray, actions: np.ndarray, values: dict[str, Any], device: str):
-        import torch
-
+        torch: Any = needed("torch", EXTRA)
         if device == "auto":
             device = "cuda" if torch.cuda.is_available() else "cpu"
         self._torch, self.device = torch, torch.device(device)

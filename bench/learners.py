@@ -17,7 +17,14 @@ from .train_env import base_env, learners_env, shown
 
 EXTRA = "rl"
 COMMON: dict[str, Any] = {"learning_rate": 3e-4, "gamma": 0.98}
-OFF_POLICY: dict[str, Any] = {**COMMON, "batch_size": 256, "learning_starts": 1000, "buffer_size": 1_000_000}
+OFF_POLICY: dict[str, Any] = {
+    **COMMON,
+    "batch_size": 256,
+    "learning_starts": 1000,
+    "buffer_size": 1_000_000,
+    # from 1, what entropy earns hides these rewards for the first 20 000 steps
+    "ent_coef": "auto_0.01",
+}
 DEFAULTS: dict[str, dict[str, Any]] = {
     "sac": OFF_POLICY,
     "sac-demo": OFF_POLICY,
@@ -73,26 +80,23 @@ def known_arguments(algorithm: str) -> set[str]:
 
 def made_model(config: TrainConfig, features: Any, normalization: Any) -> Any:
     """A learner of Stable-Baselines3 that has learned nothing yet, with its environments."""
-    needed("torch", EXTRA)
-    from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import DummyVecEnv
-
+    library: Any = needed("stable_baselines3", EXTRA)
+    monitor: Any = needed("stable_baselines3.common.monitor", EXTRA).Monitor
+    vector: Any = needed("stable_baselines3.common.vec_env", EXTRA).DummyVecEnv
     values = chosen(config)
     own = {key: values.pop(key) for key in OWN if key in values}
-    make: Callable[[], Any] = lambda: Monitor(learners_env(config, features, normalization))  # noqa: E731
+    make: Callable[[], Any] = lambda: monitor(learners_env(config, features, normalization))  # noqa: E731
     more: dict[str, Any] = {}
     if config.algorithm == "sac-demo":
         more["replay_buffer_class"] = symmetric_buffer()
     if config.algorithm == "sac-her":
-        from stable_baselines3 import HerReplayBuffer
-
-        more["replay_buffer_class"] = HerReplayBuffer
+        more["replay_buffer_class"] = library.HerReplayBuffer
         more["replay_buffer_kwargs"] = {"n_sampled_goal": own["n_sampled_goal"]}
     policy = "MultiInputPolicy" if config.algorithm == "sac-her" else "MlpPolicy"
     try:
         model = _kind(config.algorithm)(
             policy,
-            DummyVecEnv([make] * own["envs"]),
+            vector([make] * own["envs"]),
             policy_kwargs={"net_arch": list(own["hidden"])},
             device=config.device,
             verbose=0,
@@ -120,17 +124,17 @@ def demo_transitions(config: TrainConfig, features: Any, normalization: Any) -> 
 
 def symmetric_buffer() -> type:
     """A replay buffer of which half of every batch is the demonstration (Ball et al., RLPD, ICML 2023)."""
-    import torch
-    from stable_baselines3.common.buffers import ReplayBuffer
+    torch: Any = needed("torch", EXTRA)
+    kind: Any = needed("stable_baselines3.common.buffers", EXTRA).ReplayBuffer
 
-    class SymmetricBuffer(ReplayBuffer):
+    class SymmetricBuffer(kind):
         """Of what was done, and of what was shown."""
 
         demo: Any = None
 
         def show(self, before: Any, after: Any, actions: Any, rewards: Any, ends: Any) -> None:
             """Keep the demonstration, for ever."""
-            self.demo = ReplayBuffer(len(before), self.observation_space, self.action_space, self.device)
+            self.demo = kind(len(before), self.observation_space, self.action_space, self.device)
             for row in zip(before, after, actions, rewards, ends, strict=True):
                 self.demo.add(*(np.asarray(part)[None] for part in row), [{}])
 

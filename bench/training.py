@@ -19,11 +19,12 @@ import numpy as np
 from ..baselines.actor import Actor, Training
 from ..baselines.actor_io import save_actor
 from ..baselines.export import actor_of
+from ..baselines.extras import needed
 from ..configs.training import TrainConfig
 from ..planner.errors import BadConfig
 from .cloning import Clone
 from .learner_state import load_state, save_state
-from .learners import chosen, demo_transitions, made_model
+from .learners import EXTRA, chosen, demo_transitions, made_model
 from .train_env import base_env, features_of, seen_env, shown
 from .training_points import LEG, NUMBERS, Point, last_leg, numbers_of, points_of
 
@@ -40,8 +41,7 @@ class Trainee:
     """
 
     def __init__(self, config: TrainConfig, seed: int, folder: Path):
-        import torch
-
+        torch: Any = needed("torch", EXTRA)
         # small networks are no faster with more, and sums would depend on their number
         torch.set_num_threads(1)
         self.config, self.seed, self.folder = config, seed, folder
@@ -103,8 +103,7 @@ class Trainee:
         if self.config.algorithm == "bc":
             self.model.learn(self.config.evaluate_every)
             return
-        from stable_baselines3.common.logger import configure
-
+        configure: Any = needed("stable_baselines3.common.logger", EXTRA).configure
         events = self.folder / "tensorboard" / f".{leg}"
         self.model.set_logger(configure(str(events), ["tensorboard"]))
         self.model.set_random_seed(_leg_seed(self.seed, leg))
@@ -173,9 +172,7 @@ def _leg_seed(seed: int, leg: int) -> int:
 
 
 def _seed_all(seed: int, leg: int) -> None:
-    from stable_baselines3.common.utils import set_random_seed
-
-    set_random_seed(_leg_seed(seed, leg))
+    needed("stable_baselines3.common.utils", EXTRA).set_random_seed(_leg_seed(seed, leg))
 
 
 def _on_disk(folder: Path) -> None:
