@@ -17,6 +17,8 @@ LONGEST = 2000
 """Characters of a paragraph or a line of code."""
 SHORT = 28
 """Characters of an entry of a table that is not broken into lines."""
+MANY = 9
+"""Columns from which on a table is set narrowly: names and entries are broken into lines."""
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 STYLE = """
 :root { color-scheme: light; }
@@ -32,6 +34,9 @@ table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tab
 th { text-align: left; font-weight: 600; border-bottom: 1.5px solid #222; vertical-align: bottom; }
 th, td { padding: .25rem 1rem .25rem 0; white-space: nowrap; overflow-wrap: normal; }
 td { border-bottom: 1px solid #eee; vertical-align: top; }
+td small { color: #666; }
+.many th, .many td.number { white-space: normal; padding-right: .7rem; }
+.many td small { display: block; white-space: nowrap; }
 th:first-child, td:first-child { position: sticky; left: 0; background: #fff; z-index: 1; }
 td.again { color: #bbb; }
 td.long { white-space: normal; min-width: 14rem; max-width: 26rem; overflow-wrap: anywhere; }
@@ -95,7 +100,8 @@ def _add_table(body: Element, table: Table) -> None:
     if table.title:
         body = SubElement(body, "details")
         SubElement(body, "summary").text = plain(table.title)
-    element = SubElement(SubElement(body, "div", {"class": "wide"}), "table")
+    kinds = "wide many" if len(table.head) > MANY else "wide"
+    element = SubElement(SubElement(body, "div", {"class": kinds}), "table")
     line = SubElement(SubElement(element, "thead"), "tr")
     for k, name in enumerate(table.head):
         SubElement(line, "th", {"class": "words" if k < table.words else "number"}).text = plain(name)
@@ -116,8 +122,12 @@ def _fill(cell: Element, entry: Entry) -> None:
     if isinstance(entry, Link):
         SubElement(cell, "a", href=entry.file).text = plain(entry.text)
     elif isinstance(entry, Rate):
-        cell.text = rate_words(entry)
+        share, _, interval = rate_words(entry).partition(" ")
+        cell.text = share
         if entry.episodes:
+            # the space keeps them apart for whoever copies the text
+            cell.text += " "
+            SubElement(cell, "small").text = interval
             low, high = 100.0 * entry.low, 100.0 * entry.high
             bar = SubElement(cell, "span", {"class": "rate", "aria-hidden": "true"})
             SubElement(bar, "i", style=f"width:{100.0 * entry.share:.1f}%")
