@@ -53,6 +53,7 @@ METRICS = {
     "share_outside": Metric("beads outside", "%", 1e2, "less", False, False, "share outside both glasses at the end"),
     "stack_offset": Metric("stack offset", "mm", 1e3, "less", True, True, "largest distance of a block from its place"),
     "stack_yaw": Metric("stack yaw", "deg", DEGREES, "less", True, False, "largest turn of a block from its place"),
+    "reach_offset": Metric("reach offset", "mm", 1e3, "less", True, True, "distance of the hand from its place"),
     "insertion_offset": Metric(
         "insertion offset", "mm", 1e3, "less", True, True, "largest distance of a book from its slot"
     ),

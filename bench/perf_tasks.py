@@ -47,7 +47,8 @@ def _step(task: str, name: str) -> Row:
     """Two scenes on the same way: one stepped as users do, one by MuJoCo alone under the controls of the first."""
     import mujoco
 
-    env, bare = started(task), started(task)
+    # twists are resolved where the arm is, so that a second sway would not have the same controls
+    env, bare = (started(task, control_mode="joint_velocity") for _ in range(2))
     model, data, substeps = bare.sim.model, bare.sim.data, env.substeps
     actions, controls = swaying(env), []
     for action in actions:

@@ -15,25 +15,32 @@ BROWSER = next(filter(None, map(shutil.which, BROWSERS)), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed: apt install chromium")
 TAGS = {
     "html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li", "div", "table", "thead",
-    "tbody", "tr", "th", "td", "span", "i", "b", "figure", "figcaption", "img", "a", "pre", "code", "details",
+    "tbody", "tr", "th", "td", "span", "i", "b", "small", "figure", "figcaption", "img", "a", "pre", "code", "details",
     "summary",
 }  # fmt: skip
 """All that a page consists of."""
 
 
 class Page(HTMLParser):
-    """All tags with their attributes, and the text."""
+    """All tags with their attributes, and the text; of a table's entry the whole of it."""
 
     def __init__(self, text):
         super().__init__()
-        self.tags, self.words = [], []
+        self.tags, self.words, self._entry = [], [], None
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
+        if tag in ("td", "th"):
+            self._entry = []
+
+    def handle_endtag(self, tag):
+        if tag in ("td", "th"):
+            self.words.append("".join(self._entry))
+            self._entry = None
 
     def handle_data(self, data):
-        self.words.append(data)
+        (self.words if self._entry is None else self._entry).append(data)
 
 
 def needs_nothing_else(page: Page, folder: Path, kind: str = "svg+xml") -> bool:

@@ -52,7 +52,8 @@ def test_the_demonstration_plays_as_the_page_says():
 
 
 def test_its_tables_name_every_method_and_every_key():
-    rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
+    page = PAGE.replace(PAGE[PAGE.index("## `onedemo train`") : PAGE.index("## What a learner sees")], "")
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
     named = [name for row in rows for name in re.findall(r"`([^`]+)`", row)]
     assert sorted(named) == sorted([*LEARNED, *KEYS])
     env = gym.make(ID)

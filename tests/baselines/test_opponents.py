@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from policies import installed
+from policies import PROGRAMS, installed
 from random_scenes import at, demonstrated, judged, panda, problem
 
 from onedemo.baselines import extras
-from onedemo.baselines.factory import POLICIES, settings_of
+from onedemo.baselines.factory import settings_of
 from onedemo.baselines.geometric import PATH_MAKERS, leg_planner, made_path
 from onedemo.baselines.made_planner import NO_WAY
 from onedemo.baselines.near_tool import NearTool
@@ -51,7 +51,7 @@ def in_the_way(path: PosePath, radius=0.04) -> Obstacle:
 
 
 def test_what_makes_paths_is_every_policy_but_the_sampler():
-    assert set(POLICIES) - set(PATH_MAKERS) == {"rrt"}
+    assert set(PROGRAMS) - set(PATH_MAKERS) == {"rrt"}
     with pytest.raises(UnknownName, match="path maker 'rrt'"):
         path_of("rrt")
 
@@ -193,7 +193,7 @@ def leg(name, obstacles=(), settings=None):
     return leg_planner(name, arm, body, settings).plan(demonstrated(), home, PLACE, obstacles)
 
 
-@pytest.mark.parametrize("name", installed(*POLICIES))
+@pytest.mark.parametrize("name", installed(*PROGRAMS))
 def test_every_policy_plans_a_leg_that_its_arm_can_follow(name):
     plan = leg(name)
     arm, _, home = panda()

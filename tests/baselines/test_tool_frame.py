@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from policies import installed
+from policies import PROGRAMS, installed
 from random_scenes import at, demonstrated, judged, panda, problem
 
-from onedemo.baselines.factory import POLICIES, make_policy, settings_of
+from onedemo.baselines.factory import make_policy, settings_of
 from onedemo.baselines.tool_frame import ToolMover, seen_from
 from onedemo.bench.geometric_metrics import curve_gap
 from onedemo.planner.command import DONE
@@ -34,7 +34,7 @@ def way_of(plan) -> PosePath:
     return PosePath(np.array([arm.fk(q).dq for q in plan.joints]))
 
 
-@pytest.mark.parametrize("name", installed(*POLICIES))
+@pytest.mark.parametrize("name", installed(*PROGRAMS))
 def test_what_is_asked_and_answered_is_of_the_true_tcp(name):
     arm, body, home = panda()
     plan = planned(name, TOOL)

@@ -122,7 +122,7 @@ REFUSED = {
     ),
     "a number of blocks": (
         "demonstration: stack\nsweep: {env.n_blocks: [3, 9]}\n",
-        "env.n_blocks: 9 is not a whole number from 2 to 6 \\(in the cell stack Panda L1 screw env.n_blocks=9\\)",
+        "env.n_blocks: 9 is not a whole number from 1 to 6 \\(in the cell stack Panda L1 screw env.n_blocks=9\\)",
     ),
     "the paper's obstacles": (
         "task: pour\ndemonstration: pour\nobstacles: paper\n",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from onedemo.bench.learning_curves import mean_interval, summary_rows
 from onedemo.bench.training_folder import curve_of
 from onedemo.bench.training_points import Point
 from onedemo.configs.shipped import FOLDER, shipped_training
-from onedemo.configs.training import ALGORITHMS, load_training
+from onedemo.configs.training import ALGORITHMS, TRAIN_KEYS, load_training
 from onedemo.planner.errors import BadConfig
 
 SMALL = [
@@ -35,6 +37,7 @@ EXTRA = {
     "ppo": ["learner.n_steps=75", "learner.batch_size=50", "learner.n_epochs=2", "learner.envs=4"],
     "bc": ["learner.batch_size=16"],
 }
+ROOT = Path(__file__).parents[2]
 SHIPPED = sorted(path.stem for path in (FOLDER / "train").glob("*.yaml"))
 
 
@@ -182,3 +185,10 @@ def test_rows_are_where_all_seeds_have_been_evaluated():
 
     curves = [[point(0, 1, False), point(0, 2, True)], [point(1, 1, True)]]
     assert [row[:2] + row[4:5] for row in summary_rows(curves)] == [(100, 0.5, 2.0)]
+
+
+def test_the_page_has_every_key_of_a_config():
+    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    table = page[page.index("## `onedemo train`") : page.index("## What a learner sees")]
+    rows = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert sorted(re.findall(r"`([a-z_]+)`", " ".join(rows))) == sorted(TRAIN_KEYS)
