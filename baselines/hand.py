@@ -105,6 +105,18 @@ class Hand:
         """Pose of an object in the hand as observed."""
         return self.measured_tcp.inverse() @ self.object_pose(index)
 
+    def lifted(self) -> Pose:
+        """`tcp_from_object` as observed of what was grasped and lifted.
+
+        Raises:
+            PlanFailed: "dropped", it was left behind.
+        """
+        assert self._held is not None
+        now = self.tcp_from(self._held.index)
+        if now.gap(self._held.grasped)[0] > LOST:
+            raise PlanFailed("dropped", f"{self.surroundings.name(self._held.index)} is not in the hand after the lift")
+        return now
+
     def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
         """The body with an object in the hand, as "held"."""
         return self.empty.holding("held", shape, tcp_from_object, self.arm)

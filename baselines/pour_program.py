@@ -24,7 +24,7 @@ from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled
 from ..planner.shapes import Obstacle, pack
 from ..planner.tsia import departure, imitated_path, screw_path
-from .hand import CLOSE, LOST, OFF, Hand
+from .hand import CLOSE, OFF, Hand
 from .mover import DIRECT, MADE, LegPlanner
 from .policy import LabeledPath
 from .pour_goals import PourGoals
@@ -91,7 +91,7 @@ class PourProgram:
         hand.slow_down(PACE)
         self.shown = {s.name: resampled(shown.segment_path(s.name), settings.resample) for s in shown.segments}
         self.in_hand = bool(hand.observation["motion_index"][0] >= 1.0)
-        self.goals = PourGoals(task, shown, self._held() if self.in_hand else None)
+        self.goals = PourGoals(task, shown, hand.tcp_from(SOURCE) if self.in_hand else None)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.shown.items()]
         self.source, self.target = (each.name for each in task.objects)
         self._plan = settings.reactive.plan
@@ -108,23 +108,17 @@ class PourProgram:
             yield from hand.grip(CLOSE, self.settings.close)
         else:
             yield from self._fetch()
-        grasped, shape = self._held(), self.task.objects[SOURCE].shape
+        grasped, shape = hand.tcp_from(SOURCE), self.task.objects[SOURCE].shape
         hand.hold(SOURCE, shape, grasped)
         if self._stands():
             hand.allow(self._standing)
             yield from hand.leave(self._lift(hand.arm.fk(hand.q)), OFF)
         # the source slips a little while it is lifted: the goal is computed from how it is held now
-        held = self._held()
-        if held.gap(grasped)[0] > LOST:
-            raise PlanFailed("dropped", f"{self.source} is not in the hand after the lift")
+        held = hand.lifted()
         hand.hold(SOURCE, shape, held)
         yield from self._carry(held)
         yield from hand.wait(self.settings.drain)
         yield from self._return()
-
-    def _held(self) -> Pose:
-        """`tcp_from_source` as observed."""
-        return self.hand.measured_tcp.inverse() @ self.hand.object_pose(SOURCE)
 
     def _stands(self) -> bool:
         """Whether the source is on its stand, from which it must be lifted."""

@@ -6,7 +6,7 @@ grows the trees; whether an edge is clear is asked of the planner's own certific
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -102,6 +102,33 @@ def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
     return np.vstack(rows)
 
 
+def joint_space(low: np.ndarray, high: np.ndarray) -> Any:
+    """OMPL's space of joints between limits (n,)."""
+    ob: Any = needed("ompl.base", "ompl")
+    bounds, space = ob.RealVectorBounds(len(low)), ob.RealVectorStateSpace(len(low))
+    for k in range(len(low)):
+        bounds.setLow(k, float(low[k]))
+        bounds.setHigh(k, float(high[k]))
+    space.setBounds(bounds)
+    return space
+
+
+def informed(space: Any, g: np.ndarray) -> Any:
+    """What OMPL knows of a space, with the planner's own answer to which states are clear; yet to be set up."""
+    ob: Any = needed("ompl.base", "ompl")
+    information, dof = ob.SpaceInformation(space), space.getDimension()
+    information.setStateValidityChecker(lambda state: room_at(g, _joints(state, dof), 0.0, 0.1) >= 0.0)
+    return information
+
+
+def state_of(space: Any, q: np.ndarray) -> Any:
+    """Joints (n,) as a state of OMPL's."""
+    state = space.allocState()
+    for k, value in enumerate(q):
+        state[k] = float(value)
+    return state
+
+
 class _Search:
     """OMPL's objects for one robot among obstacles.
 
@@ -114,14 +141,8 @@ class _Search:
         self._util: Any = needed("ompl.util", "ompl")
         self._util.setLogLevel(self._util.LogLevel.LOG_NONE)
         self._settings, self._dof, self._asked = settings, len(low), [0]
-        bounds = self._ob.RealVectorBounds(self._dof)
-        for k in range(self._dof):
-            bounds.setLow(k, float(max(low[k], -np.pi)))
-            bounds.setHigh(k, float(min(high[k], np.pi)))
-        self._space = self._ob.RealVectorStateSpace(self._dof)
-        self._space.setBounds(bounds)
-        self._information = self._ob.SpaceInformation(self._space)
-        self._information.setStateValidityChecker(_validity(g, self._dof))
+        self._space = joint_space(np.maximum(low, -np.pi), np.minimum(high, np.pi))
+        self._information = informed(self._space, g)
         self._information.setMotionValidator(_edges(self._ob, self._information, g, self._dof, self._asked))
         self._information.setup()
 
@@ -130,9 +151,9 @@ class _Search:
         # what is made from here on draws from this seed, whatever was drawn before
         self._util.RNG.setSeed(seed % 2_000_000_000 + 1)
         problem, goal = self._ob.ProblemDefinition(self._information), self._ob.GoalStates(self._information)
-        problem.addStartState(self._state(start))
+        problem.addStartState(state_of(self._space, start))
         for each in goals:
-            goal.addState(self._state(each))
+            goal.addState(state_of(self._space, each))
         problem.setGoal(goal)
         planner = self._og.RRTConnect(self._information)
         planner.setRange(self._settings.step)
@@ -143,16 +164,6 @@ class _Search:
         if not problem.hasExactSolution():
             return None
         return np.array([_joints(state, self._dof) for state in problem.getSolutionPath().getStates()])
-
-    def _state(self, q: np.ndarray) -> Any:
-        state = self._space.allocState()
-        for k, value in enumerate(q):
-            state[k] = float(value)
-        return state
-
-
-def _validity(g: np.ndarray, dof: int) -> Callable[[Any], bool]:
-    return lambda state: room_at(g, _joints(state, dof), 0.0, 0.1) >= 0.0
 
 
 def _edges(ob: Any, information: Any, g: np.ndarray, dof: int, asked: list[int]) -> Any:

@@ -13,12 +13,11 @@ import numpy as np
 
 from ..envs.task import TaskDescription, TaskObject
 from ..planner.demo import Demonstration
-from ..planner.errors import PlanFailed
 from ..planner.pose import Pose, PosePath
 from ..planner.segment import resampled, trimmed
 from ..planner.tsia import departure
 from .choice import Choice, Leg
-from .hand import CLOSE, LOST, OFF, OPEN, Hand
+from .hand import CLOSE, OFF, OPEN, Hand
 from .policy import LabeledPath
 from .surroundings import TABLE
 
@@ -95,15 +94,13 @@ class StackProgram:
 
     def _place(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
-        grasped = self._held(k)
+        grasped = self.hand.tcp_from(k)
         self.hand.hold(k, target.shape, grasped)
         lift = self._lift(k, grasped)
         if lift is not None:
             yield from self.hand.leave(lift, OFF)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
-        held = self._held(k)
-        if held.gap(grasped)[0] > LOST:
-            raise PlanFailed("dropped", f"{target.name} is not in the hand after the lift")
+        held = self.hand.lifted()
         choice = self.hand.choose(self._placement(k, held))
         path = choice.path if lift is None else lift.joined(choice.path)
         self.paths.append(LabeledPath("final", f"place {target.name}", path))
@@ -118,10 +115,6 @@ class StackProgram:
         if pose.position[2] - half > self.task.table_height + OFF:
             return None
         return self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
-
-    def _held(self, k: int) -> Pose:
-        """`tcp_from_object` as observed."""
-        return self.hand.measured_tcp.inverse() @ self.hand.object_pose(k)
 
     def _chosen_fetch(self, k: int) -> Choice:
         """The grasp from which the object can also be placed."""

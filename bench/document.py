@@ -42,7 +42,7 @@ class Link:
 
     Attributes:
         text: what is shown.
-        file: path relative to the report, made of letters, digits and `-_./` alone.
+        file: path relative to the report, made of letters, digits, `-_./` and `%` alone; see `escaping.link_to`.
     """
 
     text: str

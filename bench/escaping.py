@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
+from pathlib import Path
 from typing import Any
 
 LONGEST = 300
 """Characters of a text that are shown."""
+_NO_LINK = re.compile(rb"[^A-Za-z0-9_./-]")
 _MARKUP = re.compile(r"([\\|<>\[\]`*_~])")
 
 
@@ -33,3 +36,9 @@ def csv_text(value: Any) -> str:
 def slug(value: Any) -> str:
     """A piece of a file name."""
     return re.sub(r"[^a-z0-9_]+", "-", plain(value, 60).lower()).strip("-") or "unnamed"
+
+
+def link_to(file: Path, folder: Path) -> str:
+    """The way from a folder to a file, as links have it: nothing in it can end the link or become markup."""
+    way = os.path.relpath(os.path.realpath(file), os.path.realpath(folder))
+    return _NO_LINK.sub(lambda found: b"%%%02X" % found[0][0], os.fsencode(way)).decode("ascii")

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from .geometric_stats import median_interval
 from .geometric_tables import is_done, is_kept, methods_in, values_of
 from .geometric_work import FRAMES, KEY_POSES, Row
-from .statistics import wilson
+from .statistics import median_interval, wilson
 
 COLORS = {
     "screw": "#d81fb4",

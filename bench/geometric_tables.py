@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from .geometric_stats import holm, mcnemar, median_interval
 from .geometric_suite import GeometricSuite, cells
 from .geometric_work import FRAMES, KEY_POSES, METHODS, Row
-from .statistics import wilson
+from .statistics import holm, mcnemar, median_interval, only_one, wilson
 
 OURS = ("screw", "repet")
 TILT, DRIFT = 10.0, 0.015
@@ -134,16 +133,14 @@ def paired(rows: Sequence[Row]) -> Iterator[str]:
             here = {name: [row for row in rows if (row["part"], row["method"]) == (part, name)] for name in names}
             for name in names:
                 if name != mine:
-                    pairs = [
-                        mcnemar([*map(claim, here[mine])], [*map(claim, here[name])]) for claim in (is_done, is_kept)
-                    ]
+                    both = [*zip(here[mine], here[name], strict=True)]
                     lines.append([part, f"`{name}`"])
-                    tests.append(pairs)
+                    tests.append([only_one([(claim(a), claim(b)) for a, b in both]) for claim in (is_done, is_kept)])
         if not lines:
             continue
-        corrected = [holm([pairs[k][2] for pairs in tests]) for k in (0, 1)]
+        corrected = [holm([mcnemar(*pairs[k]) for pairs in tests]) for k in (0, 1)]
         for line, pairs, *ps in zip(lines, tests, *corrected, strict=True):
-            for (only, other, _), p in zip(pairs, ps, strict=True):
+            for (only, other), p in zip(pairs, ps, strict=True):
                 line.append(f"{only} : {other} (p {p:.2g})")
         yield from table(
             ["segment", f"`{mine}` against", "reached and clear, only one of the two", "constraint kept too"], lines

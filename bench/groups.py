@@ -19,7 +19,7 @@ from .metric_table import METRICS, Metric
 from .records import HUNG, EpisodeRecord
 from .run_reading import Run
 from .scenarios import place_of as drawn_from
-from .statistics import FEWEST, Difference, holm, mcnemar, paired_bootstrap, wilson
+from .statistics import FEWEST, Difference, holm, mcnemar, only_one, paired_bootstrap, wilson
 from .tasks import TASKS
 
 ORDERED = ("L0", "L1", "L2", "L3", "L4")
@@ -215,7 +215,7 @@ def success_tests(groups: list[Group], succeeded: Callable[[EpisodeRecord], bool
     found = []
     for reference, other in _opponents(groups):
         pairs = [(succeeded(a), succeeded(b)) for a, b in _paired(reference, other)]
-        ours, theirs = pairs.count((True, False)), pairs.count((False, True))
+        ours, theirs = only_one(pairs)
         found.append(SuccessTest(other.setting, other.label, len(pairs), ours, theirs, mcnemar(ours, theirs), 1.0))
     adjusted = _adjusted([(test.label, test.p) for test in found])
     return [

@@ -50,6 +50,7 @@ summary { cursor: pointer; color: #0060a8; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); gap: 1rem;
   align-items: start; }
 figure { margin: 1rem 0; }
+.figures.photos { grid-template-columns: repeat(auto-fit, minmax(min(100%, 30rem), 1fr)); }
 .figures img { width: 100%; max-width: 28rem; height: auto; }
 .figures img.photo { max-width: 60rem; }
 .figures a, .figures span { font-size: .8rem; }
@@ -138,7 +139,8 @@ def _fill(cell: Element, entry: Entry) -> None:
 
 def _add_pictures(body: Element, block: Pictures) -> None:
     figure = SubElement(body, "figure")
-    grid = SubElement(figure, "div", {"class": "figures"})
+    photos = " photos" if any(picture.kind == "png" for picture in block.pictures) else ""
+    grid = SubElement(figure, "div", {"class": f"figures{photos}"})
     for picture in block.pictures:
         place = SubElement(grid, "div")
         data = base64.b64encode(picture.image).decode()

@@ -8,6 +8,7 @@ from typing import Any
 from ..planner.errors import BadConfig
 from . import report_tables as tables
 from .document import Block, Bullets, Code, Document, Heading, Link, Paragraph, Picture, Pictures, Table
+from .escaping import link_to
 from .files import write_whole
 from .groups import UNSAFE, Group, groups_by_task, groups_of, metric_tests, success_tests
 from .html_page import html_of
@@ -20,7 +21,7 @@ from .run_reading import Run, merged, read_run
 from .statistics import FEWEST
 from .summary import SUMMARY, summary_row, write_summary
 from .tables_csv import write_tables
-from .videos import FILMED, videos_in
+from .videos import FILMED, videos_beside
 
 INTERVALS = "Whiskers and brackets are Wilson 95 % intervals of single cells; nothing is pooled over levels."
 TESTS = (
@@ -91,7 +92,7 @@ def _document(run: Run, output: Path) -> Document:
         *([Heading(2, "Success against the speed of obstacles"), *shown["speed"]] if shown["speed"] else []),
         Heading(2, "Failures"),
         *shown["failures"],
-        *_failures(groups, output),
+        *_failures(groups, run, output),
         Heading(2, "Quality of motion"),
         *_metrics(groups),
         *shown["clearance"],
@@ -100,26 +101,34 @@ def _document(run: Run, output: Path) -> Document:
         *shown["timing"],
         Heading(2, "What each method needs"),
         tables.costs(groups),
-        *_first_episode(output),
+        *_first_episodes(run, output),
         *_repeating(run),
     ]
     return document
 
 
-def _first_episode(output: Path) -> list[Block]:
-    """Figure and video of the first episode, where a run has made them, or why there are none."""
-    shown = written_json(output, SHOWN)
-    if not shown:
-        return []
-    blocks: list[Block] = [Heading(2, "The first episode")]
-    if (output / FIGURE).is_file():
-        picture = Picture(FIGURE, (output / FIGURE).read_bytes(), "demonstration, final and executed paths", "png")
-        blocks.append(Pictures([picture], PATHS))
-    if (output / VIDEO).is_file() and not shown.get("video_problem"):
-        speed = f"{shown.get('speed', 1.0):.0f} times as fast as the simulation"
-        blocks.append(Table(["what", "file"], [[f"the episode, {speed}", Link(VIDEO, VIDEO)]]))
+def _first_episodes(run: Run, output: Path) -> list[Block]:
+    """Figures and videos of the first episodes, where runs have made them, or why there are none."""
+    blocks = []
+    for folder in run.folders:
+        shown = written_json(folder, SHOWN)
+        of = f" of {folder.name}" if len(run.folders) > 1 else ""
+        blocks += _first_episode(shown, folder, of, output) if shown else []
+    return [Heading(2, "The first episode"), *blocks] if blocks else []
+
+
+def _first_episode(shown: dict[str, Any], folder: Path, of: str, output: Path) -> list[Block]:
+    blocks: list[Block] = []
+    figure, video = folder / FIGURE, folder / VIDEO
+    if figure.is_file():
+        words = "demonstration, final and executed paths"
+        picture = Picture(link_to(figure, output), figure.read_bytes(), words, "png")
+        blocks.append(Pictures([picture], f"The episode{of}. {PATHS}" if of else PATHS))
+    if video.is_file() and not shown.get("video_problem"):
+        speed = f"the episode{of}, {shown.get('speed', 1.0):.0f} times as fast as the simulation"
+        blocks.append(Table(["what", "file"], [[speed, Link(VIDEO, link_to(video, output))]]))
     problems = {"figure": shown.get("figure_problem"), "video": shown.get("video_problem")}
-    missing = [f"No {what}: {problem}." for what, problem in problems.items() if problem]
+    missing = [f"No {what}{of}: {problem}." for what, problem in problems.items() if problem]
     return [*blocks, Bullets(missing)] if missing else blocks
 
 
@@ -164,10 +173,11 @@ def _tests(groups: list[Group]) -> list[Block]:
     return [Heading(2, f"Paired tests against {REFERENCE}"), Paragraph(TESTS), *tests]
 
 
-def _failures(groups: list[Group], output: Path) -> list[Block]:
-    films = videos_in(output)
+def _failures(groups: list[Group], run: Run, output: Path) -> list[Block]:
+    films = videos_beside(run.folders, output)
     table = tables.failures(groups, films)
-    problems = dict.fromkeys(problem for problem in written_json(output, FILMED).values() if problem)
+    filmed = [written_json(folder, FILMED) for folder in run.folders]
+    problems = dict.fromkeys(problem for each in filmed for problem in each.values() if problem)
     missing = [Bullets([f"Failures without a video: {problem}." for problem in problems])] if problems else []
     every = [tables.every_failure(groups, films)] if table.rows and len(groups) == 1 else []
     unsafe = [tables.unsafe_successes(groups)] if any(group.outcomes[UNSAFE] for group in groups) else []

@@ -77,7 +77,7 @@ def write_page(output: Path, found: Sequence[Finished], took: str) -> list[Path]
 
 def results_table(runs: Sequence[Finished]) -> Table:
     """A line for each experiment."""
-    head = ["experiment", "success", "Wilson 95 %", "no unwanted contact", "obstacle touched", "nearest [mm]", "error"]
+    head = ["experiment", "success", "Wilson 95 %", "no unwanted contact", "obstacle touched", "nearest [mm]"]
     rows: list[list[Entry]] = []
     for each in runs:
         row = each.rows[0]
@@ -85,9 +85,17 @@ def results_table(runs: Sequence[Finished]) -> Table:
         touched = "-" if row["clearance_mm_min"] is None else f"{row['touching']} of {row['episodes']}"
         rows.append([
             each.experiment.title, f"{row['successes']} of {row['episodes']}", interval, str(row["safe_successes"]),
-            touched, _said(row["clearance_mm_min"]), f"{row['error']}: {_said(row['error_max'])}",
+            touched, _said(row["clearance_mm_min"]), _largest_error(row),
         ])  # fmt: skip
-    return Table(head, rows)
+    return Table([*head, "largest error"], rows)
+
+
+def _largest_error(row: Row) -> str:
+    """Number, unit and of what, short enough for a line of a table."""
+    what, _, unit = row["error"].rpartition(" [")
+    for word in ("largest ", "share of "):
+        what = what.removeprefix(word)
+    return f"{_said(row['error_max'])} {unit[:-1]} ({what.removesuffix(' error')})"
 
 
 def _section(each: Finished, output: Path) -> list[Block]:
@@ -100,7 +108,10 @@ def _section(each: Finished, output: Path) -> list[Block]:
         among = each.rows[0]["clearance_mm_min"] is not None
         colors += ["Cyan: led round what nobody showed."] if among else []
         colors += ["Dashed: as executed."]
-    shown = [Picture(file, (output / file).read_bytes(), experiment.title, "png") for file in each.pictures]
+    shown = [
+        Picture(file, (output / file).read_bytes(), f"{experiment.title} ({Path(file).stem})", "png")
+        for file in each.pictures
+    ]
     blocks: list[Block] = [
         Heading(2, experiment.title),
         Paragraph(f"Paper: {experiment.paper}"),

@@ -15,6 +15,8 @@ import numpy as np
 Values = Sequence[float] | np.ndarray
 RESAMPLES = 2000
 """Draws of a bootstrap: the error of its 95 % ends is then some percent of their distance."""
+MEDIANS = 1000
+"""Draws of a bootstrap of medians."""
 AT_ONCE = 2_000_000
 """Numbers drawn together."""
 
@@ -34,6 +36,17 @@ def median(values: Values) -> float:
     return float(np.median(values)) if len(values) else float("nan")
 
 
+def median_interval(values: Values) -> tuple[float, float, float]:
+    """Median and its 95 % interval: percentiles of a bootstrap, the same for the same values; NaN of nothing."""
+    array = np.asarray(values, dtype=np.float64)
+    if not len(array):
+        return math.nan, math.nan, math.nan
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(array), (MEDIANS, len(array)))
+    low, high = np.quantile(np.median(array[drawn], axis=1), (0.025, 0.975))
+    return float(np.median(array)), float(low), float(high)
+
+
 def quantile(values: Values, q: float) -> float:
     """Quantile, for example 0.99; NaN of nothing."""
     return float(np.quantile(values, q)) if len(values) else float("nan")
@@ -44,6 +57,11 @@ def interquartile_mean(values: Values) -> float:
     from scipy.stats import trim_mean
 
     return float(trim_mean(values, 0.25)) if len(values) else float("nan")
+
+
+def only_one(pairs: Sequence[tuple[bool, bool]]) -> tuple[int, int]:
+    """In how many pairs the first alone succeeds, and in how many the second."""
+    return pairs.count((True, False)), pairs.count((False, True))
 
 
 def mcnemar(only_first: int, only_second: int) -> float:

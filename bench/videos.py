@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .escaping import slug
+from .escaping import link_to, slug
 from .records import EpisodeRecord
 
 FOLDER, FILMED = "videos", "videos.json"
@@ -60,6 +60,17 @@ def video_of(record: EpisodeRecord) -> Video:
     reason = slug(record.failure_reason)
     name = f"{record.cell}-{record.index}-{record.seed}-{reason}.mp4"
     return Video(record.cell, record.index, record.seed, reason, f"{FOLDER}/{name}")
+
+
+def videos_beside(folders: Iterable[Path], output: Path) -> list[Video]:
+    """The videos of run folders, as a report in another folder leads to them; of an episode's those of the first."""
+    found: dict[tuple[str, int], Video] = {}
+    for folder in folders:
+        here = videos_in(folder)
+        known = set(found)
+        linked = {(v.cell, v.index): replace(v, file=link_to(folder / v.file, output)) for v in here}
+        found |= {key: video for key, video in linked.items() if key not in known}
+    return list(found.values())
 
 
 def videos_in(folder: Path) -> list[Video]:

@@ -1,6 +1,8 @@
-"""Long runs that try to break a promise, in chunks that can be gone on with.
+"""Long runs that try to break a promise; `make soak`.
 
-    python tests/soak.py --guard 1000000 --seed 0 --output bench/soak.json
+    python tests/soak.py --guard 1000000 --kills 50 --seed 0 --output bench/soak.json
+
+Of the guard in chunks that can be gone on with. Runs of episodes are killed at any moment, see `killed_runs`.
 
 The guard: robots among obstacles, commands that want to hit them; nothing may ever come closer than it must keep,
 neither at the ends of a step nor in between. Its parts are used by the test suite too.
@@ -13,6 +15,7 @@ import hashlib
 import json
 import platform
 import sys
+import tempfile
 import time
 from functools import cache
 from importlib.metadata import version
@@ -40,6 +43,7 @@ MODES = (BANG, RANDOM, CORNER, ABSURD, STEEPEST, TOWARDS, GRAZE, STEEPEST, TOWAR
 # columns of a tally
 STEPS, TOO_CLOSE, WORST, BEYOND, ROOMY, FALSE_STOPS, STATUS, STOPPED, AT_SURFACE = 0, 1, 2, 3, 4, 5, 6, 10, 11
 TALLY = 12
+PLANNER = Path(jit.__file__).parent
 SLACK = 1e-9
 """Rounding [m] that is no violation."""
 
@@ -306,22 +310,26 @@ def fcl_rooms(scene: Scene, log: np.ndarray, substeps: int) -> float:
 # ------------------------------------------------------------------ the long run
 
 
-def planner_digest() -> str:
-    """sha256 of all sources of the planner; that of the guard is of what it imports, directly or not, alone."""
+def sources_digest(*folders: Path) -> str:
+    """sha256 of all sources in some folders."""
     digest = hashlib.sha256()
-    for file in sorted(Path(jit.__file__).parent.glob("*.py")):
+    for file in sorted(file for folder in folders for file in folder.glob("*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
 
 
+def versions(*names: str) -> dict[str, str]:
+    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+
+
 def fresh(seed: int) -> dict:
-    names = ("numpy", "numba", "python-fcl", "pin")
     return {
         "what": "guard fuzz: static scenes, adversarial commands; judged at 10 places per step, some by python-fcl",
-        "planner_sha256": planner_digest(),
+        "planner_sha256": sources_digest(PLANNER),
+        # of what the guard imports, directly or not, alone
         "guard_sha256": jit.content_digest(Path(safety.__file__)),
         "seed": seed,
-        "versions": {"python": platform.python_version(), **{name: version(name) for name in names}},
+        "versions": versions("numpy", "numba", "python-fcl", "pin"),
         "chunks": 0,
         "steps": 0,
         "violations": 0,
@@ -370,27 +378,62 @@ def add_chunk(report: dict, chunk: int, steps: int) -> str:
     )
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--guard", type=int, default=1_000_000, help="steps of the guard")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--chunk", type=int, default=5000, help="steps per scene")
-    parser.add_argument("--output", type=Path, default=Path("bench/soak.json"))
-    options = parser.parse_args()
-    report = fresh(options.seed)
-    if options.output.is_file():
-        before = json.loads(options.output.read_text(encoding="utf-8")).get("guard", {})
+def written(file: Path, **parts: dict) -> None:
+    """Put parts into the file, the others stay."""
+    values = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps({**values, **parts}, indent=2) + "\n", encoding="utf-8")
+    part.replace(file)
+
+
+def soak_guard(steps: int, seed: int, chunk: int, output: Path) -> bool:
+    """Go on with the steps of the guard, or begin; whether it has kept its promise."""
+    report = fresh(seed)
+    if output.is_file():
+        before = json.loads(output.read_text(encoding="utf-8")).get("guard", {})
         if all(before.get(key) == report[key] for key in ("guard_sha256", "seed", "versions")):
             report = before
     begun = time.monotonic()
-    while report["steps"] < options.guard:
-        line = add_chunk(report, report["chunks"], min(options.chunk, options.guard - report["steps"]))
-        part = options.output.with_suffix(".part")
-        part.write_text(json.dumps({"guard": report}, indent=2) + "\n", encoding="utf-8")
-        part.replace(options.output)
+    while report["steps"] < steps:
+        line = add_chunk(report, report["chunks"], min(chunk, steps - report["steps"]))
+        written(output, guard=report)
         print(f"{line}  {report['steps']} steps, {time.monotonic() - begun:.0f} s", flush=True)
     print(json.dumps(report, indent=2))
-    return 1 if report["violations"] or report["beyond_limits"] else 0
+    return not (report["violations"] or report["beyond_limits"])
+
+
+def soak_runs(kills: int, seed: int, output: Path) -> bool:
+    """Kill runs so many times; whether nothing was lost."""
+    import killed_runs
+
+    with tempfile.TemporaryDirectory() as folder:
+        found = killed_runs.killed_runs(Path(folder), kills, seed)
+    report = {
+        "what": f"runs of {killed_runs.EPISODES} episodes without a simulator, killed at any moment and gone on with",
+        "bench_sha256": sources_digest(PLANNER.parent / "bench", PLANNER.parent / "configs"),
+        "seed": seed,
+        "versions": versions("numpy", "pydantic"),
+        **found,
+    }
+    written(output, kills=report)
+    print(json.dumps(report, indent=2))
+    return found["same_table"] and not (found["lost"] or found["twice"] or found["damaged"])
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--guard", type=int, default=0, help="steps of the guard")
+    parser.add_argument("--kills", type=int, default=0, help="kills of a run")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--chunk", type=int, default=5000, help="steps per scene")
+    parser.add_argument("--output", type=Path, default=Path("bench/soak.json"))
+    options = parser.parse_args(arguments)
+    kept = True
+    if options.guard:
+        kept &= soak_guard(options.guard, options.seed, options.chunk, options.output)
+    if options.kills:
+        kept &= soak_runs(options.kills, options.seed, options.output)
+    return 0 if kept else 1
 
 
 if __name__ == "__main__":

@@ -84,6 +84,16 @@ def test_the_command_takes_it(monkeypatch, capsys):
     assert "my_policies has no 'Below'; it has: " in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.parametrize("change", ["level=T", "tool=[0, 0, 0.1, 0]"])
+def test_it_has_no_legs_to_be_moved_in_another_frame(change, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "method=my_policies:Above", change])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "tool: my_policies:Above moves the hand itself: only the legs of shipped policies" in said
+
+
 @pytest.mark.parametrize(
     "name, message",
     [

@@ -3,75 +3,51 @@
 from __future__ import annotations
 
 import json
-import os
-import random
-import shutil
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
+import killed_runs as killed_module
 import pytest
+import soak
+from example_records import some
 from fake_runs import ONE_CELL, completed, dispatcher, grid_in
+from killed_runs import cost_of, fake_onedemo, killed_runs
 
 from onedemo.bench.finishing import report
 from onedemo.bench.records import FILE, RecordWriter, read_records
-from onedemo.bench.run_folder import Shard, gather, parsed_shard, read_cells, recorded, table_hash
+from onedemo.bench.run_folder import Shard, gather, parsed_shard, recorded, table_hash
 from onedemo.bench.scenarios import check_mergeable, read_suite
 from onedemo.planner.errors import BadConfig
 
-SCRIPT = Path(__file__).parents[1] / "fake_runs.py"
-KILLS = 5 * int(os.environ.get("ONEDEMO_SOAK", "1"))
-SEED = int(os.environ.get("ONEDEMO_SEED", "0"))
-
-
-def fake_onedemo(folder, *arguments, **options):
-    run = [sys.executable, str(SCRIPT), "run", "grid.yaml", *arguments]
-    fake = {**os.environ, "FAKE": json.dumps({"pause": 0.02})}
-    return subprocess.Popen(run, cwd=folder, env=fake, text=True, stdout=-1, stderr=-1, **options)
-
-
-def table_of(folder):
-    """Hash of all results, and how many lines hold a record."""
-    _, labeled = read_cells(folder)
-    cells = [cell for _, cell in labeled]
-    records, _ = recorded(folder, cells, read_suite(folder))
-    return table_hash(records.values()), len(records)
-
 
 def test_a_run_that_is_killed_at_any_moment_loses_no_finished_episode(tmp_path):
-    grid_in(tmp_path)
-    begun = time.monotonic()
-    whole = fake_onedemo(tmp_path, "-q", "-o", "whole")
-    assert whole.communicate(timeout=120)[1] == ""
-    seconds = time.monotonic() - begun
-    (reference,) = (tmp_path / "whole").iterdir()
-    draw, finished = random.Random(SEED), 0
-    for attempt in range(KILLS):
-        run = fake_onedemo(tmp_path, "-q")
-        # startup takes most of the time, and nothing can be lost in it
-        time.sleep(draw.uniform(0.3, 1.05) * seconds)
-        run.send_signal(signal.SIGKILL)
-        run.communicate(timeout=60)
-        for file in tmp_path.glob(f"runs/*/{FILE}"):
-            records, foreign = read_records(file)
-            assert foreign == [], f"kill {attempt}"
-            assert len({record.key for record in records}) == len(records) >= finished
-            finished = len(records)
-        if finished == 48:
-            shutil.rmtree(tmp_path / "runs")
-            finished = 0
-    assert fake_onedemo(tmp_path, "-q").wait(timeout=120) == 0
-    (folder,) = (tmp_path / "runs").iterdir()
-    assert table_of(folder) == table_of(reference) == (table_of(reference)[0], 48)
-    assert summary_of(folder) == summary_of(reference)
+    """`make soak` kills fifty times: bench/soak.json."""
+    found = killed_runs(tmp_path, 5, 0)
+    assert found["same_table"] and found["kills"] == 5
+    assert (found["lost"], found["twice"], found["damaged"]) == (0, 0, 0)
 
 
-def summary_of(folder):
-    rows = json.loads((folder / "summary.json").read_text())["rows"]
-    return [{key: value for key, value in row.items() if not key.startswith("tick_us")} for row in rows]
+def test_what_a_kill_has_cost_is_counted():
+    one, two, three = some(3)
+    assert cost_of(set(), [one, two], []) == {"in_the_middle": 1, "lost": 0, "twice": 0, "damaged": 0}
+    assert cost_of({one.key, two.key}, [two, three, two], [4]) == {
+        "in_the_middle": 0, "lost": 1, "twice": 1, "damaged": 1,
+    }  # fmt: skip
+    assert cost_of(set(), some(48), [])["in_the_middle"] == 0, "it was finished"
+
+
+def test_kills_are_recorded_beside_what_was_measured_before(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "soak.json"
+    file.write_text(json.dumps({"guard": {"steps": 7}}))
+    found = {"kills": 50, "in_the_middle": 20, "lost": 0, "twice": 0, "damaged": 0, "same_table": True}
+    monkeypatch.setattr(killed_module, "killed_runs", lambda folder, kills, seed: {**found, "kills": kills})
+    assert soak.main(["--kills", "50", "--seed", "3", "--output", str(file)]) == 0
+    values = json.loads(file.read_text())
+    assert values["guard"] == {"steps": 7}
+    assert (values["kills"]["kills"], values["kills"]["seed"], values["kills"]["lost"]) == (50, 3, 0)
+    assert "numpy" in values["kills"]["versions"] and len(values["kills"]["bench_sha256"]) == 64
+    found["lost"] = 1
+    assert soak.main(["--kills", "50", "--output", str(file)]) == 1
+    capsys.readouterr()
 
 
 def test_a_file_cut_at_every_byte_of_its_last_three_lines_heals_to_the_same_table(tmp_path):

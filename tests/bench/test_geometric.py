@@ -15,7 +15,6 @@ from onedemo.bench.console import console
 from onedemo.bench.geometric_clear import FAR, ToolJudge
 from onedemo.bench.geometric_parts import KINDS, part_named, robot, tool_of
 from onedemo.bench.geometric_run import Order, jobs_for, recorded, results_hash, run_geometric, wanted_rows
-from onedemo.bench.geometric_stats import holm, mcnemar, median_interval
 from onedemo.bench.geometric_suite import FILE, LEVELS, GeometricSuite, cells, drawn, read_suite
 from onedemo.bench.geometric_tables import is_kept
 from onedemo.bench.geometric_work import (
@@ -208,13 +207,6 @@ def test_a_turn_that_sweeps_into_something_is_found():
     path = PosePath.from_vectors([[0, 0, 0, 1, 0, 0, 0], [0, 0, 0, *half]])
     ball = Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.29 * np.cos(0.8), 0.29 * np.sin(0.8), 0.0]))
     assert not ToolJudge(tool, [ball]).judged(path).clear
-
-
-def test_intervals_and_paired_tests():
-    middle, low, high = median_interval(list(range(101)))
-    assert middle == 50 and 35 < low < 50 < high < 65
-    assert mcnemar([True] * 6 + [False], [False] * 6 + [False]) == (6, 0, pytest.approx(2 / 64))
-    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
 
 
 def test_a_line_that_is_none_is_passed_over(tmp_path):

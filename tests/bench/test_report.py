@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import threading
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -416,6 +418,53 @@ def test_a_video_is_linked_from_its_failure(tmp_path):
     assert text.count("[video](videos/") == 1
     assert f"[video]({video.file})" in text
     assert f'href="{video.file}"' in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def filmed_run(folder, **options):
+    """A run with an empty video of its first failure, and its path from the folder."""
+    small_run(folder, **options)
+    video = video_of(chosen(read_run(folder).every)[0])
+    (folder / "videos").mkdir()
+    (folder / video.file).touch()
+    return folder, video.file
+
+
+@pytest.mark.parametrize("name", ["theirs", "a run's (2nd) [x] & 50% \u00fc"])
+def test_a_report_of_several_runs_leads_to_the_videos_of_all(tmp_path, name):
+    ours, one = filmed_run(tmp_path / "ours", methods=("screw",))
+    theirs, other = filmed_run(tmp_path / name, methods=("replay",))
+    for output, way in ((tmp_path / "reports" / "both", "../../"), (ours, "../")):
+        files = write_report_of([ours, theirs], output)
+        page = Page(files[1].read_text(encoding="utf-8"))
+        links = [each["href"] for tag, each in page.tags if tag == "a" and each["href"].endswith(".mp4")]
+        assert {(output / unquote(link)).resolve() for link in links} == {ours / one, theirs / other}
+        assert one in links[0] if output == ours else links[0] == f"{way}ours/{one}"
+        assert all(f"[video]({link})" in files[0].read_text(encoding="utf-8") for link in links)
+        assert all(re.fullmatch(r"[A-Za-z0-9_./%-]+", link) for link in links)
+
+
+def test_of_an_episode_in_two_runs_the_first_video_is_linked(tmp_path):
+    ours, file = filmed_run(tmp_path / "ours", methods=("screw",))
+    again, _ = filmed_run(tmp_path / "again", methods=("screw",))
+    text = write_report_of([ours, again], tmp_path / "both")[0].read_text(encoding="utf-8")
+    assert f"[video](../ours/{file})" in text and "../again/" not in text
+
+
+def test_first_episodes_of_several_runs_are_shown_with_their_folders(tmp_path):
+    folders = [small_run(tmp_path / name, methods=(name,)) for name in ("screw", "replay")]
+    for folder in folders:
+        (folder / "showcase.json").write_text(json.dumps({"video": True, "speed": 4.0, "video_problem": ""}))
+        (folder / "episode0.png").write_bytes(b"PNG")
+        (folder / "episode0.mp4").touch()
+    (folders[1] / "showcase.json").write_text(json.dumps({"video": True, "video_problem": "no ffmpeg"}))
+    files = write_report_of(folders, tmp_path / "both")
+    text, page = (file.read_text(encoding="utf-8") for file in files[:2])
+    assert "(../screw/episode0.png)" in text and "(../replay/episode0.png)" in text
+    assert "[episode0.mp4](../screw/episode0.mp4)" in text and "(../replay/episode0.mp4)" not in text
+    assert "No video of replay: no ffmpeg." in text
+    assert text.count("## The first episode") == 1 and 'href="../screw/episode0.mp4"' in page
+    alone = write_report(folders[0])[0].read_text(encoding="utf-8")
+    assert "[episode0.mp4](episode0.mp4)" in alone and "of screw" not in alone
 
 
 def test_tables_hold_every_episode_and_every_cell(run):

@@ -199,7 +199,7 @@ def test_the_sentence_about_trees_compares_with_what_the_paper_prints():
 
 def test_the_table_tells_touching_from_nothing_to_touch():
     done = command.Finished(RUNS[0], [ROW], (), "")
-    assert results_table([done]).rows[0][4:6] == ["0 of 10", "12.3"]
+    assert results_table([done]).rows[0][4:] == ["0 of 10", "12.3", "2.0 mm (position)"]
     free = command.Finished(RUNS[0], [{**ROW, "clearance_mm_min": None}], (), "")
     assert results_table([free]).rows[0][4:6] == ["-", "-"]
 

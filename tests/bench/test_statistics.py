@@ -16,6 +16,8 @@ from onedemo.bench.statistics import (
     interquartile_mean,
     mcnemar,
     median,
+    median_interval,
+    only_one,
     paired_bootstrap,
     quantile,
     wilson,
@@ -39,7 +41,23 @@ def test_wilsons_interval_covers_as_often_as_it_says(rate):
     assert 0.93 <= np.dot(covered, weights) <= 0.98
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_interval_of_a_median_is_about_that_of_the_order_statistics(seed):
+    """Of 101 draws the binomial's 95 % are the 41st and the 61st in order."""
+    values = np.random.default_rng(seed).normal(size=101)
+    middle, low, high = median_interval(values)
+    ordered = np.sort(values)
+    assert middle == ordered[50]
+    assert ordered[38] <= low <= ordered[43] and ordered[57] <= high <= ordered[62]
+    assert median_interval(list(values)) == (middle, low, high)
+
+
+def test_pairs_in_which_one_alone_succeeds():
+    assert only_one([(True, False)] * 6 + [(False, False), (True, True), (False, True)]) == (6, 1)
+
+
 def test_statistics_of_nothing_say_so():
+    assert all(map(math.isnan, median_interval([])))
     assert wilson(0, 0) == (0.0, 1.0)
     assert math.isnan(median([]))
     assert math.isnan(quantile([], 0.99))
