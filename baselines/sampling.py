@@ -103,8 +103,10 @@ def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
 
 
 def joint_space(low: np.ndarray, high: np.ndarray) -> Any:
-    """OMPL's space of joints between limits (n,)."""
+    """OMPL's space of joints between limits (n,); from now on OMPL says nothing."""
     ob: Any = needed("ompl.base", "ompl")
+    util: Any = needed("ompl.util", "ompl")
+    util.setLogLevel(util.LogLevel.LOG_NONE)
     bounds, space = ob.RealVectorBounds(len(low)), ob.RealVectorStateSpace(len(low))
     for k in range(len(low)):
         bounds.setLow(k, float(low[k]))
@@ -139,7 +141,6 @@ class _Search:
         self._ob: Any = needed("ompl.base", "ompl")
         self._og: Any = needed("ompl.geometric", "ompl")
         self._util: Any = needed("ompl.util", "ompl")
-        self._util.setLogLevel(self._util.LogLevel.LOG_NONE)
         self._settings, self._dof, self._asked = settings, len(low), [0]
         self._space = joint_space(np.maximum(low, -np.pi), np.minimum(high, np.pi))
         self._information = informed(self._space, g)

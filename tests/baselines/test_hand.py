@@ -77,6 +77,17 @@ def test_what_is_lost_ends_the_motion_as_dropped(hand):
     assert failed.value.reason == "dropped"
 
 
+def test_what_a_lift_has_left_behind_was_dropped(hand):
+    """A little slip is how it is held now, measured from where it was grasped."""
+    slipped = Pose.from_position_quaternion([0.0, 0.0, LOST - 0.005]) @ GRASP
+    hand.observation = observed(hand, slipped)
+    assert hand.lifted().gap(slipped)[0] < 1e-9
+    hand.observation = observed(hand, Pose.from_position_quaternion([0.0, 0.0, LOST + 0.005]) @ GRASP)
+    with pytest.raises(PlanFailed, match="block0 is not in the hand after the lift") as failed:
+        hand.lifted()
+    assert failed.value.reason == "dropped"
+
+
 def test_an_empty_hand_misses_nothing(hand):
     hand.release()
     hand.observation = observed(hand, Pose.from_position_quaternion([0.3, 0.0, 0.0]))
