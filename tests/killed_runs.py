@@ -22,12 +22,18 @@ from onedemo.bench.scenarios import read_suite
 
 SCRIPT = Path(__file__).with_name("fake_runs.py")
 EPISODES = 48
+LATE = 40
+"""Episodes at whose end a run is killed at the latest, so that it is not over before it hears of it."""
+PAUSE = 0.02
+"""Seconds that an episode takes."""
+STARTING = 5
+"""One kill of so many comes while the run is starting."""
 
 
 def fake_onedemo(folder, *arguments, **options):
     """`onedemo run` of the grid in a folder, as a process of its own."""
     run = [sys.executable, str(SCRIPT), "run", "grid.yaml", *arguments]
-    fake = {**os.environ, "FAKE": json.dumps({"pause": 0.02})}
+    fake = {**os.environ, "FAKE": json.dumps({"pause": PAUSE})}
     return subprocess.Popen(run, cwd=folder, env=fake, text=True, stdout=-1, stderr=-1, **options)
 
 
@@ -60,10 +66,13 @@ def killed_runs(folder: Path, kills: int, seed: int) -> dict[str, Any]:
     seconds = time.monotonic() - begun
     (reference,) = (folder / "whole").iterdir()
     tally, draw, before = Counter(cost_of(set(), [], [])), random.Random(seed), set()
-    for _ in range(kills):
+    for kill in range(kills):
         run = fake_onedemo(folder, "-q")
-        # startup takes most of the time, and nothing can be lost in it
-        time.sleep(draw.uniform(0.3, 1.05) * seconds)
+        if kill % STARTING == STARTING - 1:
+            time.sleep(draw.uniform(0.0, 0.8) * seconds)
+        else:
+            _wait_for(draw.randint(len(before) + 1, max(LATE, len(before) + 1)), folder, run)
+            time.sleep(draw.uniform(0.0, 2.0 * PAUSE))
         run.send_signal(signal.SIGKILL)
         run.communicate(timeout=600)
         files = list(folder.glob(f"runs/*/{FILE}"))
@@ -78,6 +87,14 @@ def killed_runs(folder: Path, kills: int, seed: int) -> dict[str, Any]:
     same = table_of(finished) == table_of(reference) == (table_of(reference)[0], EPISODES)
     done = errors == "" and last == 0 and summary_of(finished) == summary_of(reference)
     return {**tally, "same_table": bool(same and done)}
+
+
+def _wait_for(episodes: int, folder: Path, run: subprocess.Popen) -> None:
+    """Until so many episodes are written, or the run is over."""
+    written = 0
+    while run.poll() is None and written < episodes:
+        time.sleep(0.001)
+        written = sum(file.read_bytes().count(b"\n") for file in folder.glob(f"runs/*/{FILE}"))
 
 
 def cost_of(before: set, records: list, foreign: list) -> dict[str, int]:

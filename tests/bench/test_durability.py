@@ -23,6 +23,7 @@ def test_a_run_that_is_killed_at_any_moment_loses_no_finished_episode(tmp_path):
     """`make soak` kills fifty times: bench/soak.json."""
     found = killed_runs(tmp_path, 5, 0)
     assert found["same_table"] and found["kills"] == 5
+    assert found["in_the_middle"] > 0, "whatever was written, it was never killed while writing"
     assert (found["lost"], found["twice"], found["damaged"]) == (0, 0, 0)
 
 
