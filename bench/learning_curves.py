@@ -66,7 +66,8 @@ def draw_curves(
                 axes.axhline(share, color=look_of(method).color, linestyle=":", linewidth=1.2, clip_on=False)
             )
             labels.append(f"{method}, no step")
-        axes.set(xlabel="environment steps", xlim=(0, None), title=title)
+        counted = "gradient" if all(method == "bc" for method, _ in trainings.values()) else "environment"
+        axes.set(xlabel=f"{counted} steps", xlim=(0, None), title=title)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1e3:g}k" if value else "0")
         share_axis(axes, "success")
         legend_above(figure, handles, labels, COLUMNS)

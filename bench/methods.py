@@ -29,6 +29,7 @@ LOOKS = {
     "screw-no-repet": Look("#0072b2", "v", "--"),
     "screw-no-guard": Look("#56b4e9", "^", "--"),
     "screw-ee-only": Look("#332288", "<", "--"),
+    "tsia": Look("#88ccee", ">", "--"),
     "decoupled": Look("#cc79a7", "s"),
     "replay": Look("#e69f00", "D"),
     "dmp-goal": Look("#d55e00", "P"),

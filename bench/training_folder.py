@@ -56,7 +56,7 @@ def actor_of_best(folder: Path, curves: dict[int, list[Point]]) -> int | None:
 
 def write_curves(config: TrainConfig, folder: Path) -> list[str]:
     """Write what is made of the curves; lines for the terminal."""
-    from .learning_curves import draw_curves, mean_interval
+    from .learning_curves import draw_curves, mean_interval, summary_rows
 
     curves = {seed: curve_of(folder, seed)[: config.legs] for seed in seeds_of(config)}
     text = io.StringIO()
@@ -74,7 +74,9 @@ def write_curves(config: TrainConfig, folder: Path) -> list[str]:
     low, high = mean_interval([point.successes for point in ends])
     share = sum(point.success for point in ends) / len(ends)
     interval = f"95 %: {low:.0%} to {high:.0%}; {len(ends)} seeds"
+    *_, middle, bottom, top = summary_rows(list(curves.values()))[-1]
     return [
+        f"return {middle:.1f} (interquartile mean of all episodes, 95 %: {bottom:.1f} to {top:.1f})",
         f"{config.name}: {share:.0%} succeed after {ends[0].steps} steps ({interval})",
         f"curve   {folder / CURVE}",
         *(f"figure  {file}" for file in files),

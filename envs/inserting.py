@@ -112,7 +112,7 @@ class InsertOneEnv(SubTask[ShelveProgress], ShelveEnv):
     * v0: first version.
     """
 
-    TOLERANCES = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0, 1.0)
+    GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(
         self,

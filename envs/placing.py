@@ -117,7 +117,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     * v0: first version.
     """
 
-    TOLERANCES = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0, 1.0)
+    GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(
         self,

@@ -100,7 +100,7 @@ class ReachEnv(SubTask[ReachProgress]):
     * v0: first version.
     """
 
-    TOLERANCES = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0)
+    GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(
         self,

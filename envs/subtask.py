@@ -41,7 +41,7 @@ class Agreement(NamedTuple):
 class SubTask(OneDemoEnv[Judged]):
     """A task of one object; see the tasks' own docstrings."""
 
-    TOLERANCES: tuple[float, ...]
+    GOAL_BOUNDS: tuple[float, ...]
     """Bounds of a goal's entries, one for each of them."""
 
     def _take_form(self, name: str, goal_form: bool, end_on_success: bool | None, *, obstacles: bool = True) -> None:
@@ -55,7 +55,7 @@ class SubTask(OneDemoEnv[Judged]):
         dense = self.reward_kind == "dense" or goal_form
         self.ends_on_success = not dense if end_on_success is None else end_on_success
         if goal_form:
-            bound = np.array(self.TOLERANCES)
+            bound = np.array(self.GOAL_BOUNDS)
             goal = space.box(-bound, bound, bound.shape)
             whole: Any = self.observation_space
             seen = {key: entry for key, entry in whole.spaces.items() if key not in TOLD_BY_GOALS}

@@ -119,7 +119,7 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
     * v0: first version.
     """
 
-    TOLERANCES = (1.0, 1.0)
+    GOAL_BOUNDS = (1.0, 1.0)
 
     def __init__(
         self,
