@@ -10,31 +10,13 @@ import numpy as np
 
 from ..baselines.extras import needed
 from ..baselines.task_episodes import task_episode
+from ..configs.learner_defaults import DEFAULTS
 from ..configs.training import TrainConfig
 from ..envs.subtask import HORIZON
 from ..planner.errors import BadConfig, BadOption
 from .train_env import base_env, learners_env, shown
 
 EXTRA = "rl"
-COMMON: dict[str, Any] = {"learning_rate": 3e-4, "gamma": 0.98}
-OFF_POLICY: dict[str, Any] = {
-    **COMMON,
-    "batch_size": 256,
-    "learning_starts": 1000,
-    "buffer_size": 1_000_000,
-    # from 1, what entropy earns hides these rewards for the first 20 000 steps
-    "ent_coef": "auto_0.01",
-}
-DEFAULTS: dict[str, dict[str, Any]] = {
-    "sac": OFF_POLICY,
-    "sac-demo": OFF_POLICY,
-    "residual": OFF_POLICY,
-    "sac-her": {**OFF_POLICY, "gamma": 0.95, "n_sampled_goal": 4, "buffer_size": 200_000},
-    "ppo": {**COMMON, "n_steps": 512, "batch_size": 256, "n_epochs": 10, "ent_coef": 0.0},
-    "bc": {"learning_rate": 1e-3, "batch_size": 64},
-}
-"""By algorithm; `hidden` and `envs` besides."""
-HIDDEN, ENVS = [256, 256], {"ppo": 4}
 OWN = ("hidden", "envs", "n_sampled_goal")
 """Arguments that are not the algorithm's: widths of the hidden layers, environments that are stepped at once in this
 process, and hindsight goals per transition."""
@@ -56,7 +38,7 @@ def chosen(config: TrainConfig) -> dict[str, Any]:
         if key not in known:
             reason = f"{config.algorithm} has no such argument; allowed: {', '.join(sorted(known))}"
             raise BadConfig(config.name, f"learner.{key}", reason)
-    values = {"hidden": HIDDEN, "envs": ENVS.get(config.algorithm, 1), **DEFAULTS[config.algorithm], **config.learner}
+    values = {"envs": 1, **DEFAULTS[config.algorithm], **config.learner}
     if config.algorithm != "ppo" and values["envs"] != 1:
         raise BadConfig(config.name, "learner.envs", "is only for ppo; another learner steps one environment")
     if config.algorithm == "sac-her" and values["learning_starts"] < HORIZON:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from ..planner.errors import BadConfig
 from .cell import STRICT, Name, digest_of, reason_of, unknown_key
+from .learner_defaults import DEFAULTS
 from .loader import COMMAND_LINE, load_mapping, with_overrides
 
 ALGORITHMS = ("sac", "ppo", "sac-her", "sac-demo", "bc", "residual")
@@ -64,8 +65,9 @@ class TrainConfig(BaseModel):
     device: str = "auto"
 
     def digest(self) -> str:
-        """Twelve hexadecimal digits of all that decides how a seed's curve goes: all but `BESIDE`."""
-        return digest_of(self.model_dump(mode="json", exclude=set(BESIDE)))
+        """Twelve hexadecimal digits of all that decides how a seed's curve goes: all but `BESIDE`, defaults too."""
+        values = self.model_dump(mode="json", exclude=set(BESIDE))
+        return digest_of({**values, "learner": {**DEFAULTS[self.algorithm], **self.learner}})
 
     @property
     def legs(self) -> int:

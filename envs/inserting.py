@@ -9,14 +9,14 @@ import numpy as np
 from ..planner.errors import BadOption
 from ..planner.pose import Pose
 from .in_hand import SQUEEZE, can_follow, holding_joints
-from .shaping import placing
+from .shaping import closeness, placing
 from .shelf_parts import BOOK_SIZE
 from .shelve_rules import MAX_ANGLE, MAX_OFFSET, WITHDRAWN, ShelveProgress
 from .shelving import GRASP, WAY_IN, ShelveEnv
 from .sim import Start
 from .spaces import REACH
 from .state import State
-from .subtask import FREQUENCY, Agreement, SubTask, screw_error
+from .subtask import FREQUENCY, Agreement, SubTask, gaps
 
 ASIDE, TURN = {"L0": 0.0, "L1": 0.01, "L2": 0.02}, {"L0": 0.0, "L1": np.deg2rad(3.0), "L2": np.deg2rad(6.0)}
 """Largest shift [m] in x, y and z and largest turn [rad] of the held book, by the name of a layout."""
@@ -31,9 +31,10 @@ class InsertProgress(ShelveProgress):
     def reward(self, state: State) -> float:
         """The dense reward of the state taken in last."""
         pose, goal, tcp = state.object_pose[0], self._goals[0], state.tcp_pose[0]
-        error, _ = screw_error(pose, goal, half_turns=False)
+        distance, angle = gaps(pose, goal, half_turns=False)
         reach = float(np.linalg.norm(pose[:3] - tcp[:3]))
-        return float(placing(reach, float(error), self.held, self.placed == 1, min(1.0, reach / WITHDRAWN)))
+        away = min(1.0, reach / WITHDRAWN)
+        return float(placing(reach, float(distance), float(angle), self.held, self.placed == 1, away))
 
 
 class InsertOneEnv(SubTask[ShelveProgress], ShelveEnv):
@@ -176,7 +177,7 @@ class InsertOneEnv(SubTask[ShelveProgress], ShelveEnv):
 
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
         """How well poses of the book agree, and whether it is let go in both or in none."""
-        error, angle = screw_error(achieved, desired, half_turns=False)
-        distance = np.linalg.norm(achieved[..., :3] - desired[..., :3], axis=-1)
+        distance, angle = gaps(achieved, desired, half_turns=False)
         free = np.abs(achieved[..., 7] - desired[..., 7]) < 0.5
-        return Agreement(error, (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE) & free)
+        there = (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE)
+        return Agreement(closeness(distance, angle), there & free)

@@ -11,14 +11,14 @@ from .base import checked_choice
 from .in_hand import SQUEEZE, holding_joints
 from .options import checked_joints, checked_poses
 from .placement import Leg
-from .shaping import placing
+from .shaping import closeness, placing
 from .sim import Start
 from .spaces import REACH
 from .stack_places import block_grasps
 from .stack_rules import BLOCK, MAX_HEIGHT, MAX_OFFSET, MAX_YAW, WITHDRAWN, StackProgress
 from .stacking import StackEnv
 from .state import State
-from .subtask import FREQUENCY, Agreement, SubTask, screw_error
+from .subtask import FREQUENCY, Agreement, SubTask, gaps
 
 ONTO = ("table", "block")
 HELD = {"L0": (0.12, 0.12), "L1": (0.08, 0.16), "L2": (0.06, 0.20)}
@@ -34,10 +34,10 @@ class PlaceProgress(StackProgress):
     def reward(self, state: State) -> float:
         """The dense reward of the state taken in last."""
         pose, goal, tcp = state.object_pose[-1], self._goals[-1], state.tcp_pose[0]
-        error, _ = screw_error(pose, goal, half_turns=True)
+        distance, angle = gaps(pose, goal, half_turns=True)
         reach = float(np.linalg.norm(pose[:3] - tcp[:3]))
         away = min(1.0, reach / WITHDRAWN)
-        return float(placing(reach, float(error), self.held, self.placed == self.n_blocks, away))
+        return float(placing(reach, float(distance), float(angle), self.held, self.placed == self.n_blocks, away))
 
 
 class PlaceOneEnv(SubTask[StackProgress], StackEnv):
@@ -199,8 +199,8 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
 
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
         """How well poses of the block agree, half turns apart, and whether it is let go in both or in none."""
-        error, angle = screw_error(achieved, desired, half_turns=True)
+        distance, angle = gaps(achieved, desired, half_turns=True)
         away = np.abs(achieved - desired)
         aside = np.hypot(away[..., 0], away[..., 1])
         there = (aside <= MAX_OFFSET) & (away[..., 2] <= MAX_HEIGHT) & (angle <= MAX_YAW)
-        return Agreement(error, there & (away[..., 7] < 0.5))
+        return Agreement(closeness(distance, angle), there & (away[..., 7] < 0.5))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..planner import screw
 from ..planner.jit import kernel
-from ..planner.pose import METERS_PER_RADIAN, Pose
+from ..planner.pose import Pose
 from .progress import Progress
 from .scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, WORLD
 from .shaping import closeness
@@ -72,11 +72,6 @@ class ReachProgress(Progress):
         return ""
 
     @property
-    def error(self) -> float:
-        """Screw length to the place [m]."""
-        return float(np.hypot(self.distance, METERS_PER_RADIAN * self.angle))
-
-    @property
     def _there(self) -> bool:
         return self.distance <= MAX_OFFSET and self.angle <= MAX_ANGLE
 
@@ -90,7 +85,7 @@ class ReachProgress(Progress):
 
     def reward(self, state: State) -> float:
         """The dense reward of the state taken in last."""
-        return 1.0 if self.success else float(closeness(self.error))
+        return 1.0 if self.success else float(closeness(self.distance, self.angle))
 
     def numbers(self) -> dict[str, Any]:
         """The task's own entries of `info`."""

@@ -14,12 +14,13 @@ from .placement import Leg
 from .reach_rules import MAX_ANGLE, MAX_OFFSET, ReachProgress
 from .render import Ghost
 from .robots import robot_named
+from .shaping import closeness
 from .sim import Start
 from .spaces import REACH
 from .stack_places import above, block_grasps, block_poses, check_places
 from .stack_rules import BLOCK_SIZE
 from .state import State
-from .subtask import FREQUENCY, Agreement, SubTask, screw_error
+from .subtask import FREQUENCY, Agreement, SubTask, gaps
 from .things import Solid, Things
 
 OPTIONS = ("level", "obstacles", "object_poses", "joint_positions")
@@ -170,6 +171,5 @@ class ReachEnv(SubTask[ReachProgress]):
 
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
         """How well poses of the tcp agree, half turns of the hand apart."""
-        error, angle = screw_error(achieved, desired, half_turns=True)
-        distance = np.linalg.norm(achieved[..., :3] - desired[..., :3], axis=-1)
-        return Agreement(error, (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE))
+        distance, angle = gaps(achieved, desired, half_turns=True)
+        return Agreement(closeness(distance, angle), (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE))

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
-from ..planner.jit import kernel
+from ..planner.pose import METERS_PER_RADIAN
 
-FAR, NEAR = 5.0, 40.0
-"""Slopes [1/m]: one that is felt from anywhere on the table, one that still tells 5 mm from 10 mm."""
-
-
-@kernel
-def closeness(error):
-    """In (0, 1], 1 where nothing is missing; `error` is a screw length [m], see `METERS_PER_RADIAN`."""
-    return 1.0 - 0.5 * (math.tanh(FAR * error) + math.tanh(NEAR * error))
+FAR, MIDDLE, NEAR = 2.0, 10.0, 40.0
+"""Slopes [1/m]: one that is felt from anywhere on the table, one that leads from there to where the last one, which
+still tells 5 mm from 10 mm, is felt."""
 
 
-@kernel
-def placing(reach, error, held, done, away):
+def near(length):
+    """In (0, 1], 1 where no length [m] is left; of a number, or of each of an array."""
+    return 1.0 - (np.tanh(FAR * length) + np.tanh(MIDDLE * length) + np.tanh(NEAR * length)) / 3.0
+
+
+def closeness(distance, angle):
+    """In (0, 1], 1 where nothing is missing; of numbers [m, rad], or of each of two arrays.
+
+    Distance and turn count apart: in one screw length the larger hides what the smaller gains, and nothing is learned
+    of it.
+    """
+    return 0.5 * (near(distance) + near(METERS_PER_RADIAN * angle))
+
+
+def placing(reach, distance, angle, held, done, away):
     """Reward in [0, 1] for one object that is to be put somewhere.
 
     Args:
         reach: from the tool to the object [m].
-        error: screw length of the object to its place [m].
+        distance: of the object from its place [m].
+        angle: by which it is turned from it [rad].
         held: it is in the hand.
         done: it is in its place and let go.
         away: in [0, 1], how much of the way the hand has withdrawn.
@@ -30,11 +39,10 @@ def placing(reach, error, held, done, away):
     if done:
         return 0.75 + 0.25 * away
     if held:
-        return 0.15 + 0.6 * closeness(error)
-    return 0.1 * (1.0 - math.tanh(FAR * reach)) + 0.05 * closeness(error)
+        return 0.15 + 0.6 * closeness(distance, angle)
+    return 0.1 * near(reach) + 0.05 * closeness(distance, angle)
 
 
-@kernel
 def tilting(way, tilt, held, poured):
     """Reward in [0, 1] for one glass that is to be emptied into another.
 
@@ -46,5 +54,5 @@ def tilting(way, tilt, held, poured):
     """
     if not held:
         return 0.5 * poured
-    there = 1.0 - math.tanh(FAR * way)
+    there = near(way)
     return 0.1 + 0.2 * there + 0.2 * there * tilt + 0.5 * poured

@@ -11,11 +11,9 @@ import numpy as np
 from gymnasium.spaces.utils import flatten, flatten_space
 
 from ..planner.errors import BadOption
-from ..planner.pose import METERS_PER_RADIAN
 from . import spaces as space
 from .base import Judged, Observation, OneDemoEnv
 from .levels import level_named
-from .shaping import FAR, NEAR
 from .state import State
 
 FREQUENCY = 20
@@ -30,11 +28,11 @@ class Agreement(NamedTuple):
     """How well achieved goals agree with desired ones.
 
     Attributes:
-        error: (...) what is missing, as a screw length [m].
+        close: (...) in [0, 1], 1 where nothing is missing; see `shaping`.
         reached: (...) whether it is within the task's tolerances.
     """
 
-    error: np.ndarray
+    close: np.ndarray
     reached: np.ndarray
 
 
@@ -96,8 +94,7 @@ class SubTask(OneDemoEnv[Judged]):
         """
         found = self.agreement(np.asarray(achieved_goal, dtype=np.float64), np.asarray(desired_goal, dtype=np.float64))
         if self.reward_kind == "dense":
-            close = 1.0 - 0.5 * (np.tanh(FAR * found.error) + np.tanh(NEAR * found.error))
-            rewards = np.where(found.reached, 1.0, 0.9 * close)
+            rewards = np.where(found.reached, 1.0, 0.9 * found.close)
         else:
             rewards = found.reached.astype(np.float64)
         return float(rewards) if rewards.ndim == 0 else rewards
@@ -132,8 +129,8 @@ def turned_by(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) ->
     return 2.0 * np.arccos(np.clip(w / np.maximum(norms, 1e-12), 0.0, 1.0))
 
 
-def screw_error(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Screw lengths (...) [m] and angles (...) [rad] between poses (..., 7)."""
+def gaps(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Distances (...) [m] and angles (...) [rad] between poses (..., 7)."""
     angle = turned_by(achieved[..., 3:7], desired[..., 3:7], half_turns=half_turns)
     distance = np.linalg.norm(achieved[..., :3] - desired[..., :3], axis=-1)
-    return np.hypot(distance, METERS_PER_RADIAN * angle), angle
+    return distance, angle

@@ -15,7 +15,7 @@ from .pour_geometry import BACK, BEADS, SOURCE, TARGET, TILTED, UP, pouring, tcp
 from .pour_layouts import GAP, RANGES, checked_stands, pour_layout
 from .pour_rules import ENOUGH, SPILLED, PourProgress, rim_gap, tilt_of
 from .pouring import PourEnv
-from .shaping import tilting
+from .shaping import near, tilting
 from .sim import Start
 from .state import State
 from .subtask import FREQUENCY, Agreement, SubTask
@@ -192,4 +192,5 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
         """How many of the beads are where they are to be; nothing is too good."""
         missing = np.maximum(desired[..., 0] - achieved[..., 0], 0.0)
         spilled = np.maximum(achieved[..., 1] - desired[..., 1], 0.0)
-        return Agreement(0.2 * (missing + spilled), (missing <= 1.0 - ENOUGH + 1e-9) & (spilled <= SPILLED + 1e-9))
+        reached = (missing <= 1.0 - ENOUGH + 1e-9) & (spilled <= SPILLED + 1e-9)
+        return Agreement(near(0.2 * (missing + spilled)), reached)

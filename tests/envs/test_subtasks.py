@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.placing import PlaceProgress
 from onedemo.envs.shaping import closeness, placing, tilting
-from onedemo.envs.subtask import screw_error, turned_by
+from onedemo.envs.subtask import gaps, turned_by
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.pose import Pose
 
@@ -142,18 +142,25 @@ def test_flags_are_flags(option):
 
 @given(small, small)
 def test_nearer_is_never_worse(a, b):
-    near, far = sorted((a, b))
-    assert 0.0 <= closeness(far) <= closeness(near) <= 1.0 == closeness(0.0)
+    close, far = sorted((a, b))
+    assert 0.0 <= closeness(far, 0.0) <= closeness(close, 0.0) <= 1.0 == closeness(0.0, 0.0)
+    assert closeness(0.0, far) <= closeness(0.0, close)
 
 
-@given(small, small, small, small)
-def test_each_stage_of_placing_pays_more_than_the_one_before(reach, error, away, other):
-    lost = placing(reach, error, False, False, away)
-    held = placing(reach, other, True, False, away)
-    placed = placing(reach, error, False, True, away)
+@given(small, small)
+def test_what_is_missing_in_one_way_does_not_hide_what_is_gained_in_the_other(distance, angle):
+    gained = closeness(0.0, angle) - closeness(distance, angle)
+    assert gained == pytest.approx(1.0 - closeness(distance, 0.0), abs=1e-12)
+
+
+@given(small, small, small, small, small)
+def test_each_stage_of_placing_pays_more_than_the_one_before(reach, error, turn, away, other):
+    lost = placing(reach, error, turn, False, False, away)
+    held = placing(reach, other, turn, True, False, away)
+    placed = placing(reach, error, turn, False, True, away)
     tiny = 1e-12
     assert -tiny <= lost <= held + tiny and held <= placed + tiny and placed <= 1.0 + tiny
-    assert placing(0.0, 0.0, False, True, 1.0) == 1.0
+    assert placing(0.0, 0.0, 0.0, False, True, 1.0) == 1.0
 
 
 @given(small, small, small, st.booleans())
@@ -257,14 +264,12 @@ def test_half_turns_count_only_where_they_are_seen(yaw, more):
 
 
 @given(st.lists(st.floats(-0.5, 0.5), min_size=6, max_size=6))
-def test_screw_errors_are_the_gaps_of_poses(numbers):
+def test_gaps_are_those_of_poses(numbers):
     a = Pose.from_position_quaternion(numbers[:3], [1.0, 0.0, 0.0, 0.0])
     turned = np.array([1.0, *numbers[3:]])
     b = Pose.from_position_quaternion(np.zeros(3), turned / np.linalg.norm(turned))
-    error, angle = screw_error(a.vector, b.vector, half_turns=False)
-    distance, turn = a.gap(b)
-    assert angle == pytest.approx(turn, abs=1e-6)
-    assert error == pytest.approx(math.hypot(distance, 0.2 * turn), abs=1e-6)
+    distance, angle = gaps(a.vector, b.vector, half_turns=False)
+    assert (distance, angle) == pytest.approx(a.gap(b), abs=1e-6)
 
 
 def test_the_goal_forms_dense_reward_has_the_shape_of_the_other(goal_envs):
@@ -274,7 +279,7 @@ def test_the_goal_forms_dense_reward_has_the_shape_of_the_other(goal_envs):
     for off in (0.02, 0.1, 0.4):
         moved = goal.copy()
         moved[0] += off
-        assert env.compute_reward(moved, goal, {}) == pytest.approx(0.9 * closeness(off))
+        assert env.compute_reward(moved, goal, {}) == pytest.approx(0.9 * closeness(off, 0.0))
 
 
 def test_a_block_lifted_from_the_start_that_stands_elsewhere_was_dropped():
