@@ -19,6 +19,7 @@ from ..planner.errors import UnknownName
 from .console import check_writable, console, labeled, writing
 from .measuring import Row, row, seconds_per_call
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
+from .perf_learning import LEARNING_LINES
 from .perf_planner import LINES
 from .perf_report import REPORT_LINES
 from .perf_runs import RUN_LINES
@@ -153,6 +154,7 @@ GROUPS: dict[str, Lines] = {
     "run": RUN_LINES,
     "process": {MEMORY: _memory, IMPORT: _import, START: _start, HELP: _help},
     "report": REPORT_LINES,
+    "learning": LEARNING_LINES,
 }
 """Per group its lines: what is measured, and how."""
 

@@ -19,6 +19,7 @@ from onedemo.bench import train as command
 from onedemo.bench.learning_curves import mean_interval, summary_rows
 from onedemo.bench.training_folder import curve_of
 from onedemo.bench.training_points import Point
+from onedemo.configs.learner_defaults import DEFAULTS
 from onedemo.configs.shipped import FOLDER, shipped_training
 from onedemo.configs.training import ALGORITHMS, TRAIN_KEYS, load_training
 from onedemo.planner.errors import BadConfig
@@ -51,6 +52,16 @@ def small(algorithm, *changes):
     task = "reach" if algorithm in ("sac", "ppo", "sac-her") else "place_one"
     more = EXTRA.get(algorithm, EXTRA["sac"])
     return [f"task={task}", f"algorithm={algorithm}", *SMALL, *more, *changes]
+
+
+def test_a_training_with_other_defaults_is_another_training(monkeypatch):
+    config = load_training(shipped_training("reach_sac"))
+    before = config.digest()
+    assert (
+        load_training(shipped_training("reach_sac"), [f"learner.gamma={DEFAULTS['sac']['gamma']}"]).digest() == before
+    )
+    monkeypatch.setitem(DEFAULTS["sac"], "gamma", 0.5)
+    assert config.digest() != before
 
 
 def trained(folder, algorithm, *changes):
