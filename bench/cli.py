@@ -188,8 +188,8 @@ def perf(
 ) -> None:
     """Measure speeds, as ratios within one run: machines differ and are shared.
 
-    A line is well when its value is at most its goal; the exit code is 1 if one is not. Lines that need a peer
-    which is not installed are skipped (extra "peers").
+    A line is well when its value is at most its goal; the exit code is 1 if one is not. Lines that need
+    what is not installed are skipped (extras "peers" and "rl").
 
     Example: onedemo perf --only controller --json perf.json
     """

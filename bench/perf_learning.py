@@ -9,12 +9,11 @@ from typing import Any
 import gymnasium as gym
 
 from ..configs.training import TrainConfig
+from ..envs.subtask import HORIZON
 from ..planner.errors import MissingExtra
 from .measuring import Row, row, seconds_per_call
 from .tasks import TASKS
 
-STEPS = 150
-"""Of an episode, and of a call that is measured."""
 SHARE = 0.85
 """Of the throughput without an environment."""
 LEARNERS: dict[str, dict[str, Any]] = {"our SAC": {}, "SB3's SAC": {"hidden": [256, 256], "batch_size": 256}}
@@ -37,7 +36,7 @@ class Idle(gym.Env):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """The same observation."""
         self._steps += 1
-        return self._seen, 0.0, False, self._steps >= STEPS, {}
+        return self._seen, 0.0, False, self._steps >= HORIZON, {}
 
 
 def _throughput(task: str, learner: str, name: str) -> Row:
@@ -57,8 +56,8 @@ def _throughput(task: str, learner: str, name: str) -> Row:
     env.close()
     ours, idle = (made_model(config, features, normalization) for _ in range(2))
     idle.set_env(vector([partial(Idle, ours.get_env())]))
-    learn = [partial(model.learn, STEPS, reset_num_timesteps=False) for model in (ours, idle)]
-    mine, theirs = (seconds / STEPS for seconds in seconds_per_call(*learn))
+    learn = [partial(model.learn, HORIZON, reset_num_timesteps=False) for model in (ours, idle)]
+    mine, theirs = (seconds / HORIZON for seconds in seconds_per_call(*learn))
     note = (
         f"{mine * 1e3:.2f} ms against {theirs * 1e3:.2f} ms per step with one update; {theirs / mine:.2f} of its speed"
     )

@@ -6,7 +6,8 @@ from typing import Any
 
 OFF_POLICY: dict[str, Any] = {
     "hidden": [128, 128],
-    # on one seed of Reach, 20 000 steps bring it as far as 50 000 with 3e-4, 0.98 and 256, each in 0.4 of the time
+    # with an earlier reward of Reach, one seed was as far after 20 000 steps as two with 3e-4, 0.98, 256 and wider
+    # layers after 50 000, and a step takes 0.4 of the time
     "learning_rate": 1e-3,
     "gamma": 0.95,
     "batch_size": 128,
