@@ -73,7 +73,7 @@ def write_curves(config: TrainConfig, folder: Path) -> list[str]:
     ends = [points[-1] for points in curves.values() if points]
     low, high = mean_interval([point.successes for point in ends])
     share = sum(point.success for point in ends) / len(ends)
-    interval = f"95 %: {low:.0%} to {high:.0%}; {len(ends)} seeds"
+    interval = f"95 %: {low:.0%} to {high:.0%}; {len(ends)} seed{'s' * (len(ends) != 1)}"
     *_, middle, bottom, top = summary_rows(list(curves.values()))[-1]
     return [
         f"return {middle:.1f} (interquartile mean of all episodes, 95 %: {bottom:.1f} to {top:.1f})",
