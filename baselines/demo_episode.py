@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..envs.base import MAX_ANGULAR, MAX_LINEAR
 from ..envs.task import TaskDescription
+from ..envs.twists import MAX_ANGULAR, MAX_LINEAR
 from ..planner.controller import Controller, ControllerSettings
 from ..planner.demo import GRIPPER_ACTIONS, Demonstration
 from ..planner.errors import BadOption

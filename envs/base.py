@@ -25,12 +25,10 @@ from .sim import PHYSICS_DT, Simulation, Start
 from .state import State
 from .task import TaskDescription, TaskFurniture, TaskObject
 from .things import TABLE_HEIGHT, Things
+from .twists import TwistDrive
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
-MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
-"""Tcp speeds [m/s, rad/s] of a full `ee_twist` action."""
-TWIST_DAMPING = 0.02
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
 SLOTS = 3
 """Obstacles that there can be at once."""
@@ -102,6 +100,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         self.metadata = {**METADATA, "render_fps": control_frequency}
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
         self.action_space = space.action_space(entries, len(self.arms))
+        self._drive = TwistDrive(self.sim, self.control_dt)
         self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
         self._action = np.zeros(self.action_space.shape or ())
         self._renderer: Renderer | None = None
@@ -168,6 +167,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         """Start an episode; the same seed and options give the same bits."""
         super().reset(seed=seed)
         self._steps = self._contacts = 0
+        self._drive.reset()
         self.sim.reset(self._started(dict(options or {})))
         observation, *_, info = self._reached()
         return observation, info
@@ -273,25 +273,13 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         self._action[:] = action
 
     def _step_twists(self) -> int:
-        """Step with tcp twists in world axes, made joint speeds by damped least squares."""
+        """Step with tcp twists in world axes."""
         finite = np.isfinite(self._action)
         if not finite.all():
             return int(np.argmin(finite))
         rows = np.clip(self._action, -1.0, 1.0).reshape(len(self.arms), -1)
-        speeds = np.column_stack([self._resolved(rows), rows[:, -1]])
-        return self.sim.step(speeds.ravel(), np.ones_like(self._speed_limits), math.inf, self.substeps)
-
-    def _resolved(self, rows: np.ndarray) -> np.ndarray:
-        """Joint speeds (n_arms, dof) of tcp twists in world axes, by damped least squares."""
-        speeds = []
-        for arm, index, row in zip(self.arms, self.sim.scene.arms, rows, strict=True):
-            x, jacobian = arm.fk_jacobian(self.sim.data.qpos[index.qpos])
-            to_body = Pose(x).rotation.T
-            twist = np.concatenate([to_body @ (MAX_LINEAR * row[:3]), to_body @ (MAX_ANGULAR * row[3:6])])
-            gram = jacobian @ jacobian.T + TWIST_DAMPING**2 * np.eye(6)
-            wanted = jacobian.T @ np.linalg.solve(gram, twist)
-            speeds.append(wanted / max(1.0, float((np.abs(wanted) / arm.velocity_limits).max())))
-        return np.array(speeds)
+        commands = np.column_stack([self._drive.commands(rows), rows[:, -1]])
+        return self.sim.step(commands.ravel(), np.ones_like(self._speed_limits), math.inf, self.substeps)
 
     def _observation(self, state: State) -> Observation:
         return {

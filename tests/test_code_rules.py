@@ -110,6 +110,7 @@ ENVS_ORDER = [
     "placement",
     "levels",
     "sim",
+    "twists",
     "render",
     "base",
     "subtask",

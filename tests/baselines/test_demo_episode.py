@@ -14,7 +14,7 @@ from onedemo.baselines.features import Features
 from onedemo.baselines.task_episodes import EPISODES, task_episode
 from onedemo.bench.tasks import TASKS
 from onedemo.configs.shipped import shipped_demonstration
-from onedemo.envs.base import MAX_ANGULAR, MAX_LINEAR
+from onedemo.envs.twists import MAX_ANGULAR, MAX_LINEAR
 from onedemo.planner.demo_io import load_demonstration
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.pose import Pose
