@@ -99,6 +99,11 @@ def load_actor(path: str | Path) -> Actor:
         raise BadActor(card, "content", one_line(str(error))) from None
 
 
+def card_path(path: Path) -> Path:
+    """The .json of an actor, given in any of the ways of `load_actor`."""
+    return _beside(_stem(path), CARD)
+
+
 def foreign(path: Path) -> str:
     """Why a file that is often taken for an actor is none; "" if it may be one, or is not there."""
     try:

@@ -26,7 +26,9 @@ RAW = "raw:"
 """Before the name of an entry: its numbers as they stand in the observation."""
 POSE, OBSTACLE = "_pose", "obstacle_"
 AXES = ("x", "y", "z", "x_axis.x", "x_axis.y", "x_axis.z", "z_axis.x", "z_axis.y", "z_axis.z")
-BETWEEN = ("x", "y", "z", "cos", "sin")
+BETWEEN = ("x", "y", "z", "cos", "sin", "near_x", "near_y", "near_z")
+NEAR = 0.02
+"""Lengths [m] up to which differences count most in the last three of them."""
 Shape = tuple[int, ...]
 
 
@@ -42,7 +44,8 @@ class Features:
       All else stands as it is.
     - a name of `RELATIVE`: for each pair of poses the difference of the positions [m] in world axes, and the cosine and
       sine of the turn between their x axes in the plane, each times the lengths of the two axes in the plane, so that
-      nothing jumps where an axis is upright. Goals and objects are paired in order where there are as many of each;
+      nothing jumps where an axis is upright; and tanh(difference / `NEAR`): on the scale of a table, what decides
+      whether a task succeeds is next to nothing. Goals and objects are paired in order where there are as many of each;
       else every one with every other.
     - `raw:NAME`: an entry's numbers as they are, as Stable-Baselines3's `MultiInputPolicy` takes them.
 
@@ -167,7 +170,7 @@ class Features:
         if block in RELATIVE:
             of, less = (bounds[key][:, :3] for bounds, key in zip((near, far), RELATIVE[block], strict=True))
             gap = of - less if self._paired(block) else (of[:, None] - less[None]).reshape(-1, 3)
-            return np.column_stack([gap, np.full((len(gap), 2), unit)]).ravel()
+            return np.column_stack([gap, np.full((len(gap), len(BETWEEN) - 3), unit)]).ravel()
         if _is_pose(block):
             places = near[block][:, :3]
             return np.column_stack([places, np.full((len(places), 6), unit)]).ravel()
@@ -215,10 +218,11 @@ def _axis(poses: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _between(of: np.ndarray, less: np.ndarray, paired: bool) -> np.ndarray:
-    """Differences (..., n, 5) of poses in order, or (..., n, m, 5) of each from each; see `Features`."""
+    """Differences (..., n, 8) of poses in order, or (..., n, m, 8) of each from each; see `Features`."""
     if not paired:
         of, less = of[..., :, None, :], less[..., None, :, :]
     to, start = _axis(of, 0), _axis(less, 0)
     cos = to[..., 0] * start[..., 0] + to[..., 1] * start[..., 1]
     sin = start[..., 0] * to[..., 1] - start[..., 1] * to[..., 0]
-    return np.concatenate([of[..., :3] - less[..., :3], cos[..., None], sin[..., None]], axis=-1)
+    gap = of[..., :3] - less[..., :3]
+    return np.concatenate([gap, cos[..., None], sin[..., None], np.tanh(gap / NEAR)], axis=-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +12,13 @@ from ..configs.shipped import shipped_actor
 from ..envs.task import TaskDescription
 from ..planner.errors import BadActor, BadOption, UnknownName
 from .actor import Actor
-from .actor_io import foreign, load_actor
+from .actor_io import card_path, foreign, load_actor
 from .policy import EpisodePolicy, Observation
 
 METHODS = ("sac", "ppo", "sac-her", "sac-demo", "bc")
 """Whose action is the actor's; `residual` adds it to another policy's."""
+DIGITS = 16
+"""Of a SHA-256, as many as tell actors apart."""
 HERE = Path("actor")
 """What stands for the file of an actor that has none."""
 
@@ -29,10 +32,15 @@ class LearnedSettings:
             task and robot.
         allow_pickle: a zip of Stable-Baselines3 is read too, which may run whatever code its author put into it;
             needs the extra `rl`.
+        sha256: of the actor's file (the .json, which holds that of the weights), or its beginning; "": not looked at.
+            A run writes it down, and goes on only with the same actor.
+        training_steps: of the environment that its training took, for reports; a run writes it down.
     """
 
     checkpoint: str = ""
     allow_pickle: bool = False
+    sha256: str = ""
+    training_steps: int = 0
 
 
 class LearnedPolicy(EpisodePolicy):
@@ -83,7 +91,9 @@ def found_actor(method: str, task: TaskDescription, settings: LearnedSettings) -
         BadActor: the actor cannot be read, or is of another method, task, robot, control or observation.
         BadOption: there is none.
     """
-    path = _file(method, task, settings.checkpoint)
+    path = actor_file(method, task.name, task.robot, settings.checkpoint)
+    if (found := sha256_of(path)) is not None and not found.startswith(settings.sha256):
+        raise BadActor(path, "sha256", f"is {found[:DIGITS]}; wanted is {settings.sha256}: it is another actor")
     if settings.allow_pickle and foreign(path).startswith("is a zip"):
         from .export import actor_of_zip
 
@@ -105,13 +115,26 @@ def check_seen(actor: Actor, observation: Observation, source: Path) -> None:
         raise BadActor(source, *unseen)
 
 
-def _file(method: str, task: TaskDescription, checkpoint: str) -> Path:
-    name = checkpoint or f"{method}-{task.name}-{task.robot}"
+def actor_file(method: str, task: str, robot: str, checkpoint: str) -> Path:
+    """The file that a checkpoint means; without one, that of the actor shipped for a method, task and robot.
+
+    Raises:
+        BadOption: none is shipped.
+    """
+    name = checkpoint or f"{method}-{task}-{robot}"
     try:
         return shipped_actor(name)
     except UnknownName as error:
         if checkpoint:
             return Path(checkpoint)
         shipped = ", ".join(str(known) for known in error.known) or "none"
-        reason = f"no actor is shipped for {method!r} on {task.name} with {task.robot}; name a file (docs/learning.md)"
+        reason = f"no actor is shipped for {method!r} on {task} with {robot}; name a file (docs/learning.md)"
         raise BadOption("checkpoint", f"{reason}; shipped: {shipped}") from None
+
+
+def sha256_of(path: Path) -> str | None:
+    """Of an actor's .json, or of whatever file it is; None: it cannot be read."""
+    try:
+        return hashlib.sha256((path if foreign(path) else card_path(path)).read_bytes()).hexdigest()
+    except OSError:
+        return None

@@ -145,7 +145,8 @@ def _differing(cell: RunConfig, others: list[RunConfig]) -> str:
 def _written(cell: RunConfig) -> dict[str, Any]:
     """What decides how episodes go, by keys with dots; settings without their common beginning."""
     values = cell.model_dump(mode="json", exclude={*BESIDE, *LATER, "settings"}, exclude_defaults=True)
-    return dict(sorted([*leaves(values), *leaves(cell.settings)]))
+    settings = {key: value for key, value in cell.settings.items() if key != "training_steps"}
+    return dict(sorted([*leaves(values), *leaves(settings)]))
 
 
 def groups_by_task(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:

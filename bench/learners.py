@@ -44,11 +44,22 @@ def chosen(config: TrainConfig) -> dict[str, Any]:
     if config.algorithm == "sac-her" and values["learning_starts"] < HORIZON:
         reason = f"{values['learning_starts']} is less than {HORIZON}, the longest episode: hindsight needs a whole one"
         raise BadConfig(config.name, "learner.learning_starts", reason)
-    rollout = values.get("n_steps", 1) * values["envs"]
+    named, rollout = _rollout(config, values)
     if config.evaluate_every % rollout:
-        reason = f"is not a multiple of learner.n_steps x learner.envs, {rollout}"
-        raise BadConfig(config.name, "evaluate_every", f"{config.evaluate_every} {reason}")
+        raise BadConfig(
+            config.name, "evaluate_every", f"{config.evaluate_every} is not a multiple of {named}, {rollout}"
+        )
     return values
+
+
+def _rollout(config: TrainConfig, values: dict[str, Any]) -> tuple[str, int]:
+    """What says how many steps are done between updates, and the number: evaluations come only after updates."""
+    if config.algorithm == "ppo":
+        return "learner.n_steps x learner.envs", values["n_steps"] * values["envs"]
+    steps = values.get("train_freq", 1)
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+        raise BadConfig(config.name, "learner.train_freq", f"{steps!r} is not a positive whole number of steps")
+    return "learner.train_freq", steps
 
 
 def known_arguments(algorithm: str) -> set[str]:

@@ -48,6 +48,8 @@ SPARE = ("#ee8866", "#ddaa33", "#bb5566", "#004488", "#777777", "#aa3377")
 WITHOUT_DEMONSTRATION = ("rrt", "sac", "sac-her", "ppo")
 STEPS_KEYS = ("env_steps", "training_steps", "total_steps", "steps")
 """Names under which the settings of a method that learns say how long."""
+ACTOR_KEYS = ("sha256", "training_steps")
+"""Settings that a run writes down of an actor; nobody has chosen them."""
 
 
 def look_of(method: str) -> Look:

@@ -20,7 +20,7 @@ from .groups import (
     groups_by_task,
     outcome_of,
 )
-from .methods import REFERENCE, STEPS_KEYS, WITHOUT_DEMONSTRATION, place_of
+from .methods import ACTOR_KEYS, REFERENCE, STEPS_KEYS, WITHOUT_DEMONSTRATION, place_of
 from .metric_table import METRICS
 from .outcome_figures import OUTCOMES
 from .rate_figures import series_of
@@ -220,7 +220,9 @@ def _steps(settings: dict[str, object]) -> int:
 
 
 def _leaves(settings: object) -> int:
-    return sum(map(_leaves, settings.values())) if isinstance(settings, dict) else 1
+    if not isinstance(settings, dict):
+        return 1
+    return sum(_leaves(value) for key, value in settings.items() if key not in ACTOR_KEYS)
 
 
 def number(value: float) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from ..configs.schema import load_grid
 from ..configs.shipped import shipped_config
 from ..planner.errors import BadConfig
+from .actors_used import with_actors
 from .board import Board
 from .checks import check_grid
 from .comparison import Comparison
@@ -58,6 +59,7 @@ def run_config(
     source, part = config_path(config), parsed_shard(shard)
     grid = load_grid(source, overrides)
     check_grid(grid)
+    grid = with_actors(grid)
     folder = output / f"{grid.name}-{grid.digest()}"
     err = console(stderr=True, quiet=quiet)
     try:

@@ -7,10 +7,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from ..baselines.features import Features
+from ..baselines.features import OBSTACLE, Features
 from ..baselines.flat_features import FlatFeatures, Normalization, measured_normalization
 from ..baselines.residual import AroundScrew
 from ..configs.training import TrainConfig
+from ..envs.subtask import LAST_ACTION
 from ..planner.demo import Demonstration
 from ..planner.demo_io import load_demonstration
 from .demo_commands import demonstration_path
@@ -71,7 +72,7 @@ def seen_env(config: TrainConfig) -> Any:
 def features_of(env: Any, config: TrainConfig) -> tuple[Features, Normalization]:
     """What is learned from, and how it is scaled: the same for all seeds."""
     goal = config.algorithm == "sac-her"
-    features = Features.raw(env.observation_space) if goal else Features.of(env.observation_space)
+    features = Features.raw(env.observation_space) if goal else Features.of(env.observation_space, _seen(env, config))
     measured = measured_normalization(env, features, episodes=MEASURED_EPISODES, steps=MEASURED_STEPS)
     if not goal:
         return features, measured
@@ -79,6 +80,17 @@ def features_of(env: Any, config: TrainConfig) -> tuple[Features, Normalization]
     mean, scale = measured.mean.copy(), measured.scale.copy()
     mean[:skip], scale[:skip] = 0.0, 1.0
     return features, Normalization(mean, scale, measured.clip)
+
+
+def _seen(env: Any, config: TrainConfig) -> tuple[str, ...] | None:
+    """The entries a learner sees; None: all but the obstacles'.
+
+    A clone that sees what was done last repeats it: in a demonstration that is right nearly always (de Haan et al.,
+    Causal Confusion in Imitation Learning, NeurIPS 2019).
+    """
+    if config.algorithm != "bc":
+        return None
+    return tuple(key for key in env.observation_space.spaces if key != LAST_ACTION and not key.startswith(OBSTACLE))
 
 
 def learners_env(config: TrainConfig, features: Features, normalization: Normalization) -> Any:

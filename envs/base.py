@@ -167,6 +167,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         """Start an episode; the same seed and options give the same bits."""
         super().reset(seed=seed)
         self._steps = self._contacts = 0
+        self._action[:] = 0.0
         self._drive.reset()
         self.sim.reset(self._started(dict(options or {})))
         observation, *_, info = self._reached()

@@ -74,6 +74,7 @@ class InsertOneEnv(SubTask[ShelveProgress], ShelveEnv):
     | `obstacle_size` | (3, 3) | 0 |
     | `obstacle_pose` | (3, 7) | 0 |
     | `obstacle_velocity` | (3, 3) | 0 |
+    | `last_action` | that of the action | what was done last; zeros at the start |
 
     With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
     `achieved_goal` and `desired_goal`

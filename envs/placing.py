@@ -76,6 +76,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
     | `obstacle_pose` | (3, 7) | the obstacles |
     | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+    | `last_action` | that of the action | what was done last; zeros at the start |
 
     With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
     `achieved_goal` and `desired_goal`

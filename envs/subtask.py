@@ -20,6 +20,7 @@ FREQUENCY = 20
 """Of actions [Hz]."""
 HORIZON = 150
 """Actions of an episode."""
+LAST_ACTION = "last_action"
 TOLD_BY_GOALS = ("goal_pose", "motion_index")
 """Entries that say what is desired, or whether it is reached: they would contradict goals that are exchanged."""
 
@@ -49,18 +50,20 @@ class SubTask(OneDemoEnv[Judged]):
                 raise BadOption(option, f"{value!r} is neither True nor False")
         self._task = replace(self._task, name=name)
         self.goal_form, self._obstacles_possible = goal_form, obstacles
+        seen: Any = self.observation_space
+        # what is told to the servos is felt some actions later: without it a learner sees but half of the state
+        self.observation_space: Any = gym.spaces.Dict({**seen.spaces, LAST_ACTION: self.action_space})
         self._check_way(level_named(self.level).obstacles if self.obstacles is None else self.obstacles)
         dense = self.reward_kind == "dense" or goal_form
         self.ends_on_success = not dense if end_on_success is None else end_on_success
         if goal_form:
             bound = np.array(self.GOAL_BOUNDS)
             goal = space.box(-bound, bound, bound.shape)
-            whole: Any = self.observation_space
-            seen = {key: entry for key, entry in whole.spaces.items() if key not in TOLD_BY_GOALS}
-            self._seen_space = gym.spaces.Dict(seen)
+            entries = self.observation_space.spaces.items()
+            self._seen_space = gym.spaces.Dict({key: entry for key, entry in entries if key not in TOLD_BY_GOALS})
             flat: Any = flatten_space(self._seen_space)
             parts: dict[str, gym.Space[Any]] = {"observation": flat, "achieved_goal": goal, "desired_goal": goal}
-            self.observation_space: Any = gym.spaces.Dict(parts)
+            self.observation_space = gym.spaces.Dict(parts)
 
     def _check_way(self, obstacles: Any) -> None:
         if not self._obstacles_possible and obstacles != "none" and len(obstacles):
@@ -98,6 +101,9 @@ class SubTask(OneDemoEnv[Judged]):
         else:
             rewards = found.reached.astype(np.float64)
         return float(rewards) if rewards.ndim == 0 else rewards
+
+    def _more_observed(self, state: State) -> Observation:
+        return {**super()._more_observed(state), LAST_ACTION: np.clip(self._action, -1.0, 1.0)}
 
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
         reward, _, info = super()._judge(state)

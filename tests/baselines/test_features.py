@@ -114,8 +114,18 @@ def test_axes_are_columns_of_the_rotation():
 def test_goals_and_objects_are_paired_only_where_there_are_as_many():
     shapes = (("goal_pose", (1, 7)), ("object_pose", (3, 7)))
     features = Features(shapes, ("goal_minus_object",))
-    assert features.size == 15 and features.names[5] == "goal_minus_object[0,1].x"
-    assert Features((("goal_pose", (3, 7)), ("object_pose", (3, 7))), ("goal_minus_object",)).size == 15
+    assert features.size == 24 and features.names[8] == "goal_minus_object[0,1].x"
+    assert Features((("goal_pose", (3, 7)), ("object_pose", (3, 7))), ("goal_minus_object",)).size == 24
+
+
+def test_differences_are_told_finely_where_they_are_small():
+    features = Features((("goal_pose", (1, 7)), ("tcp_pose", (1, 7))), ("goal_minus_tcp",))
+    tcp, gap = np.array([[0.3, -0.2, 1.0, 1, 0, 0, 0]]), np.array([0.003, -0.02, 0.5])
+    goal = tcp + np.r_[gap, 0, 0, 0, 0]
+    seen = dict(zip(features.names, features({"goal_pose": goal, "tcp_pose": tcp}), strict=True))
+    for axis, length in zip("xyz", gap, strict=True):
+        assert seen[f"goal_minus_tcp[0,0].{axis}"] == pytest.approx(length, abs=1e-6)
+        assert seen[f"goal_minus_tcp[0,0].near_{axis}"] == pytest.approx(np.tanh(length / 0.02), abs=1e-5)
 
 
 def test_obstacles_are_seen_only_if_they_are_asked_for(env):

@@ -174,6 +174,10 @@ def test_mistakes_are_one_line(change, message, tmp_path):
 def test_a_rollout_must_fit_between_evaluations(tmp_path):
     with pytest.raises(BadConfig, match=r"evaluate_every: 300 is not a multiple of .* 280"):
         command.run_training("reach_ppo", small("ppo", "learner.n_steps=70"), tmp_path)
+    with pytest.raises(BadConfig, match=r"evaluate_every: 300 is not a multiple of learner.train_freq, 7"):
+        command.run_training("reach_sac", small("sac", "learner.train_freq=7"), tmp_path)
+    with pytest.raises(BadConfig, match=r"train_freq: \[1, 'episode'\] is not a positive whole number of steps"):
+        command.run_training("reach_sac", small("sac", "learner.train_freq=[1, episode]"), tmp_path)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
