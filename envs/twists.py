@@ -5,8 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from ..planner.jit import kernel
+from ..planner.linear import backward_solve, cholesky, forward_solve, gram
 from ..planner.pose import Pose
-from .arm_index import ArmIndex
 from .servos import DAMPING, STIFFNESS
 from .sim import Simulation
 
@@ -15,6 +16,8 @@ MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
 LEAST_SQUARES_DAMPING = 0.02
 TORQUE_SHARE = 0.7
 """Of the motors' torque limits, what changes of speed may ask for; the rest is for what the servos correct."""
+FACTOR, SOLUTION = 6, 12
+"""Rows of the workspace after the six of the Gram matrix."""
 
 
 class TwistDrive:
@@ -34,40 +37,80 @@ class TwistDrive:
         self._sim, self._arms, self._dt = simulation, simulation.scene.arms, dt
         self._speeds = np.zeros((len(self._arms), self._arms[0].arm.dof))
         self._changes = np.zeros_like(self._speeds)
+        self._wanted = np.zeros(self._arms[0].arm.dof)
         self._inertia = np.zeros((simulation.model.nv, simulation.model.nv))
+        self._torques = [simulation.model.actuator_forcerange[index.ctrl, 1].copy() for index in self._arms]
+        self._work = np.zeros((SOLUTION + 1, 6))
 
     def reset(self) -> None:
         """All joints are at rest."""
         self._speeds[:] = self._changes[:] = 0.0
 
     def commands(self, twists: np.ndarray) -> np.ndarray:
-        """Rates (n_arms, dof) [rad/s] of the servos' set points until the next action.
-
-        A servo's torque is stiffness (set point - q - lag q'), so that q' changes evenly from v to v + c within dt if
-        the set point's rate is v + c / 2 + lag c / dt + M (c - c_before) / (stiffness dt^2), M the arm's inertia.
+        """Rates (n_arms, dof) [rad/s] of the servos' set points until the next action; see `_followed`.
 
         Args:
             twists: (n_arms, 6) linear and angular parts in world axes, as shares of the largest ones.
         """
-        model, data, dt, rates = self._sim.model, self._sim.data, self._dt, np.empty_like(self._speeds)
-        mujoco.mj_fullM(model, self._inertia, data.qM)
+        data, rates = self._sim.data, np.empty_like(self._speeds)
+        mujoco.mj_fullM(self._sim.model, self._inertia, data.qM)
         for k, (index, twist) in enumerate(zip(self._arms, twists, strict=True)):
-            inertia = self._inertia[np.ix_(index.qvel, index.qvel)]
-            torques = model.actuator_forcerange[index.ctrl, 1]
-            change = _resolved(index, twist, data.qpos) - self._speeds[k]
-            change /= max(1.0, float((np.abs(inertia @ change) / (TORQUE_SHARE * dt * torques)).max()))
-            push = inertia @ (change - self._changes[k]) / (STIFFNESS * torques * dt**2)
-            rates[k] = self._speeds[k] + (0.5 + DAMPING / dt) * change + push
-            self._changes[k] = change
-            self._speeds[k] += change
+            x, jacobian = index.arm.fk_jacobian(data.qpos[index.qpos])
+            _resolved(jacobian, Pose(x).rotation, twist, index.arm.velocity_limits, self._work, self._wanted)
+            mine = self._inertia, index.qvel, self._torques[k]
+            _followed(self._wanted, *mine, self._dt, self._speeds[k], self._changes[k], rates[k])
         return rates
 
 
-def _resolved(index: ArmIndex, twist: np.ndarray, qpos: np.ndarray) -> np.ndarray:
-    """Joint speeds (dof,) of a twist (6,), by damped least squares, within the arm's limits."""
-    x, jacobian = index.arm.fk_jacobian(qpos[index.qpos])
-    to_body = Pose(x).rotation.T
-    wanted = np.concatenate([to_body @ (MAX_LINEAR * twist[:3]), to_body @ (MAX_ANGULAR * twist[3:6])])
-    gram = jacobian @ jacobian.T + LEAST_SQUARES_DAMPING**2 * np.eye(6)
-    speeds = jacobian.T @ np.linalg.solve(gram, wanted)
-    return speeds / max(1.0, float((np.abs(speeds) / index.arm.velocity_limits).max()))
+# compiled not for speed alone: NumPy's linear algebra depends, in the last digit, on the number of threads
+
+
+@kernel
+def _resolved(jacobian, rotation, twist, limits, work, speeds):
+    """Joint speeds (dof,) of a twist (6,), by damped least squares on the body Jacobian, within the arm's limits."""
+    n, b = len(speeds), work[SOLUTION]
+    for i in range(3):
+        linear, angular = 0.0, 0.0
+        for k in range(3):
+            linear += rotation[k, i] * twist[k]
+            angular += rotation[k, i] * twist[3 + k]
+        b[i], b[3 + i] = MAX_LINEAR * linear, MAX_ANGULAR * angular
+    gram(jacobian, 0, n, work, 0)
+    cholesky(work, 0, LEAST_SQUARES_DAMPING**2, work, FACTOR)
+    forward_solve(work, FACTOR, b)
+    backward_solve(work, FACTOR, b)
+    worst = 1.0
+    for j in range(n):
+        s = 0.0
+        for k in range(6):
+            s += jacobian[k, j] * b[k]
+        speeds[j] = s
+        worst = max(worst, abs(s) / limits[j])
+    for j in range(n):
+        speeds[j] /= worst
+
+
+@kernel
+def _followed(wanted, inertia, dofs, torques, dt, speeds, changes, rates):
+    """Bring the speeds (dof,) as near to the wanted ones as the motors can within dt, and the rates that do so.
+
+    A servo's torque is stiffness (set point - q - lag q'), so that q' changes evenly from v to v + c within dt if the
+    set point's rate is v + c / 2 + lag c / dt + M (c - c_before) / (stiffness dt^2), M the arm's inertia.
+    """
+    n, worst = len(speeds), 1.0
+    for i in range(n):
+        s = 0.0
+        for j in range(n):
+            s += inertia[dofs[i], dofs[j]] * (wanted[j] - speeds[j])
+        worst = max(worst, abs(s) / (TORQUE_SHARE * dt * torques[i]))
+    for i in range(n):
+        s = 0.0
+        for j in range(n):
+            s += inertia[dofs[i], dofs[j]] * ((wanted[j] - speeds[j]) / worst - changes[j])
+        rates[i] = s / (STIFFNESS * torques[i] * dt**2)
+    for i in range(n):
+        change = (wanted[i] - speeds[i]) / worst
+        rates[i] += speeds[i] + (0.5 + DAMPING / dt) * change
+        changes[i] = change
+    for i in range(n):
+        speeds[i] += changes[i]

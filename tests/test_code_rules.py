@@ -18,7 +18,7 @@ LOWER = {
     "bench": {"planner", "envs", "baselines", "configs"},
 }
 ENVS_MAY_USE = {"errors", "dualquat", "pose", "arm", "jit", "chain", "screw", "shapes", "body", "body_models"}
-ENVS_MAY_USE |= {"proximity", "ik", "models"}
+ENVS_MAY_USE |= {"proximity", "ik", "models", "linear"}
 """The planner's lowest floor: geometry and kinematics, no method."""
 PLANNER_ORDER = [
     "errors",
