@@ -84,6 +84,26 @@ def train(
 
 
 @app.command()
+def curves(
+    trainings: Annotated[list[Path], typer.Argument(metavar="TRAINING", help="Folders of onedemo train, of one task.")],
+    run: Annotated[
+        Path | None, typer.Option("--run", help="A run folder whose methods need no training: drawn as lines.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the files.")] = Path("curves"),
+) -> None:
+    """Draw trainings of one task in one figure, beside what needs no step: one demonstration, or N steps.
+
+    Reads the folders, whether the trainings are finished or not, and trains nothing. Writes the figure (.png, .pdf),
+    every evaluation (.csv) and a page with a table (.md), the last line on standard output.
+
+    Example: onedemo curves trainings/reach-sac-* trainings/reach-ppo-* --run runs/reach-0123456789ab
+    """
+    from .curves_command import run_curves
+
+    run_curves(trainings, run, output)
+
+
+@app.command()
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of the same scenarios.")],
     output: Annotated[

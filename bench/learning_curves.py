@@ -4,19 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .figure_style import legend_above, new_figure, saved, styled
+from ..envs.subtask import HORIZON
+from .figure_style import COLUMN, LEGEND_ROW, legend_above, saved, styled
 from .methods import look_of
 from .rate_figures import share_axis
 from .statistics import hierarchical_bootstrap, interquartile_mean, wilson
 from .training_points import Point
 
-HEIGHT, COLUMNS = 2.3, 2
+HEIGHT, COLUMNS = 3.3, 2
+"""Of a figure without its legend [inch]; columns of the legend."""
 Curves = Sequence[Sequence[Point]]
 """Of each seed its evaluations."""
+
+
+class Line(NamedTuple):
+    """What needs no step of the environment.
+
+    Attributes:
+        method: that it is drawn like.
+        share: of successes.
+        cost: what it needs, in words.
+    """
+
+    method: str
+    share: float
+    cost: str = "no step"
 
 
 def mean_interval(groups: Sequence[Sequence[bool]]) -> tuple[float, float]:
@@ -45,44 +61,54 @@ def summary_rows(curves: Curves) -> list[tuple[int, float, float, float, float, 
 
 
 def draw_curves(
-    trainings: Mapping[str, tuple[str, Curves]], stem: Path, title: str, lines: Mapping[str, float] | None = None
+    trainings: Mapping[str, tuple[str, Curves]], stem: Path, title: str, lines: Mapping[str, Line] | None = None
 ) -> list[Path]:
-    """Draw success against steps as .png and .pdf; the files.
+    """Draw successes and returns against steps as .png and .pdf; the files.
 
     Args:
         trainings: by label, the method that it is drawn like, and its curves.
         stem: of the files.
         title: of the figure.
-        lines: shares of successes of methods that need no step, by name.
+        lines: what needs no step, by label.
     """
+    from matplotlib.figure import Figure
+
+    lines = lines or {}
     with styled():
-        figure, axes = new_figure(HEIGHT, len(trainings) + len(lines or {}), COLUMNS)
+        rows = -(-(len(trainings) + len(lines)) // COLUMNS)
+        figure = Figure(figsize=(COLUMN, HEIGHT + LEGEND_ROW * rows), layout="constrained")
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         handles, labels = [], []
+        for label, line in lines.items():
+            style = {"color": look_of(line.method).color, "linewidth": 1.2, "clip_on": False}
+            handles.append(top.axhline(line.share, linestyle=":", **style))
+            labels.append(f"{label}, {line.cost}")
         for label, (method, curves) in trainings.items():
-            handles.append(_drawn(axes, method, curves))
+            handles.append(_drawn(top, bottom, method, curves))
             labels.append(f"{label} ({len(curves)} seed{'s' * (len(curves) != 1)})")
-        for method, share in (lines or {}).items():
-            handles.append(
-                axes.axhline(share, color=look_of(method).color, linestyle=":", linewidth=1.2, clip_on=False)
-            )
-            labels.append(f"{method}, no step")
         counted = "gradient" if all(method == "bc" for method, _ in trainings.values()) else "environment"
-        axes.set(xlabel=f"{counted} steps", xlim=(0, None), title=title)
-        axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1e3:g}k" if value else "0")
-        share_axis(axes, "success")
+        top.set(title=title)
+        bottom.set(xlabel=f"{counted} steps", xlim=(0, None), ylim=(0, HORIZON), ylabel="return")
+        bottom.set_yticks((0, HORIZON // 2, HORIZON))
+        bottom.grid(False, axis="x")
+        bottom.xaxis.set_major_formatter(lambda value, _: f"{value / 1e3:g}k" if value else "0")
+        share_axis(top, "success")
         legend_above(figure, handles, labels, COLUMNS)
         saved(figure, stem)
     return [stem.with_suffix(suffix) for suffix in (".png", ".pdf")]
 
 
-def _drawn(axes: Any, method: str, curves: Curves) -> Any:
-    """A thin line for each seed, a thick one for all, and its interval; the thick one."""
-    look = look_of(method)
-    for points in curves:
-        steps, shares = [point.steps for point in points], [point.success for point in points]
-        axes.plot(steps, shares, color=look.color, linewidth=0.5, alpha=0.5, clip_on=False)
-    rows = np.array([row[:4] for row in summary_rows(curves)]).reshape(-1, 4)
-    axes.fill_between(rows[:, 0], rows[:, 2], rows[:, 3], color=look.color, alpha=0.15, linewidth=0)
-    style = {"color": look.color, "marker": look.marker, "linestyle": look.line}
-    (line,) = axes.plot(rows[:, 0], rows[:, 1], linewidth=1.5, markeredgewidth=0.0, clip_on=False, **style)
+def _drawn(top: Any, bottom: Any, method: str, curves: Curves) -> Any:
+    """For successes and for returns a thin line for each seed, a thick one for all, its interval; the handle."""
+    look, rows = look_of(method), np.array(summary_rows(curves)).reshape(-1, 7)
+    style = {"color": look.color, "marker": look.marker, "linestyle": look.line, "linewidth": 1.5, "markersize": 3.0}
+    line = None
+    for axes, column in ((top, 1), (bottom, 4)):
+        for points in curves:
+            values = [point.success if axes is top else interquartile_mean(np.array(point.returns)) for point in points]
+            steps = [point.steps for point in points]
+            axes.plot(steps, values, color=look.color, linewidth=0.5, alpha=0.5, clip_on=False)
+        axes.fill_between(rows[:, 0], *rows[:, column + 1 : column + 3].T, color=look.color, alpha=0.15, linewidth=0)
+        (drawn,) = axes.plot(*rows[:, [0, column]].T, markeredgewidth=0.0, clip_on=False, **style)
+        line = line or drawn
     return line

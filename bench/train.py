@@ -20,10 +20,9 @@ from .environment import fingerprint
 from .executors import Serial, cores
 from .files import write_whole
 from .run_folder import LOG, open_folder
-from .training_folder import SEED, curve_of, seeds_of, write_curves
+from .training_folder import CONFIG, SEED, curve_of, seeds_of, write_curves
 
 INTERRUPTED, DISK_FULL = 130, 3
-CONFIG = "config.json"
 
 
 def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:

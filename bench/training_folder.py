@@ -22,7 +22,7 @@ from ..configs.training import TrainConfig
 from .files import write_whole
 from .training_points import Point, last_leg, numbers_of, points_of
 
-SEED, CURVE, ACTOR = "seed-{}", "curve.csv", "actor"
+CONFIG, SEED, CURVE, ACTOR = "config.json", "seed-{}", "curve.csv", "actor"
 COLUMNS = ("seed", "steps", "episodes", "successes", "success", "return", "seconds")
 
 

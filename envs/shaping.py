@@ -39,7 +39,8 @@ def placing(reach, distance, angle, held, done, away):
     if done:
         return 0.75 + 0.25 * away
     if held:
-        return 0.15 + 0.6 * closeness(distance, angle)
+        # turned right it mostly is already: told as loudly as the way, it is all that is learned
+        return 0.15 + 0.45 * near(distance) + 0.15 * near(METERS_PER_RADIAN * angle)
     return 0.1 * near(reach) + 0.05 * closeness(distance, angle)
 
 
