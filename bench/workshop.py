@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from ..configs.cell import RunConfig
 from ..planner.errors import BadConfig, BadOption, NoRoom, OneDemoError
 from ..planner.pose import Pose
+from .methods import WITHOUT_DEMONSTRATION
 from .records import ERROR, EpisodeRecord, known_record
 from .run_folder import FIGURE, VIDEO
 from .scenarios import Scenario, ScenarioChanged, scenarios_of
@@ -253,7 +254,8 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
         env.close()
     among = "" if config.obstacles in (None, "none") else f", obstacles {config.obstacles}"
     where = f"{config.task}, {config.robot}, {config.condition}{among}"
-    title = f"{where}, seed {config.seed}: one demonstration, {config.method}"
+    shown = "no demonstration" if config.method in WITHOUT_DEMONSTRATION else "one demonstration"
+    title = f"{where}, seed {config.seed}: {shown}, {config.method}"
     draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
     return {"speed": seen.speed, "video": config.video, "video_problem": seen.video_problem}
 
