@@ -8,7 +8,7 @@ OFF_POLICY: dict[str, Any] = {
     "hidden": [128, 128],
     "learning_rate": 5e-4,
     "gamma": 0.95,
-    # an update takes longer than a step of the environment, and with small networks hardly less with half the batch
+    # an update takes two to four times as long as a step of the environment
     "batch_size": 256,
     "train_freq": 2,
     "learning_starts": 1000,
