@@ -19,11 +19,11 @@ OFF_POLICY: dict[str, Any] = {
 PPO: dict[str, Any] = {
     "hidden": [128, 128],
     "envs": 4,
-    "learning_rate": 3e-4,
-    "gamma": 0.98,
-    "n_steps": 512,
+    "learning_rate": 1e-3,
+    "gamma": 0.95,
+    "n_steps": 256,
     "batch_size": 256,
-    "n_epochs": 10,
+    "n_epochs": 5,
     "ent_coef": 0.0,
 }
 DEFAULTS: dict[str, dict[str, Any]] = {
