@@ -61,6 +61,22 @@ def test_they_are_made_for_training(name, envs):
     assert ends == [(False, False)] * 149 + [(False, True)]
 
 
+@each_id
+@pytest.mark.parametrize("mode", ["ee_twist", "joint_velocity"])
+def test_what_was_done_last_is_seen(name, mode):
+    env = gym.make(name, control_mode=mode)
+    observation, _ = env.reset(seed=0)
+    assert not observation["last_action"].any()
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        action = rng.uniform(-1.5, 1.5, env.action_space.shape)
+        observation, *_ = env.step(action)
+        np.testing.assert_array_equal(observation["last_action"], np.clip(action, -1.0, 1.0))
+        action[:] = 0.0  # a copy was kept
+    again, _ = env.reset(seed=1)
+    assert not again["last_action"].any() and observation["last_action"].any()
+
+
 @each_held
 @pytest.mark.parametrize("robot", ["Panda", "Baxter"])
 def test_what_is_in_the_hand_from_the_start_stays_there(name, robot):
