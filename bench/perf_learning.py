@@ -49,7 +49,7 @@ def _throughput(task: str, learner: str, name: str) -> Row:
         vector: Any = needed("stable_baselines3.common.vec_env", EXTRA).DummyVecEnv
     except MissingExtra:
         return Row(name, None, "ratio", 1.0 / SHARE, None, f"needs: pip install 'onedemo[{EXTRA}]'")
-    values = {"learning_starts": 100, "buffer_size": 10_000, **LEARNERS[learner]}
+    values = {"train_freq": 1, "learning_starts": 100, "buffer_size": 10_000, **LEARNERS[learner]}
     config = TrainConfig(name="perf", task=task, algorithm="sac", demonstration="stack", steps=1, learner=values)
     env = seen_env(config)
     features, normalization = features_of(env, config)
