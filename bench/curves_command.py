@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections import Counter
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -31,6 +32,9 @@ CAPTION = (
     "intervals (bootstrap of seeds, then of their episodes). Dotted: what needs no step of the environment."
 )
 
+Trained = tuple[TrainConfig, Curves]
+"""A training's config, and the evaluations of each seed."""
+
 
 def run_curves(trainings: list[Path], run: Path | None, output: Path) -> None:
     """Draw the curves, write their numbers, and say where they are.
@@ -38,20 +42,21 @@ def run_curves(trainings: list[Path], run: Path | None, output: Path) -> None:
     Raises:
         BadConfig: a folder is of no training or of another task, or the run has no method that needs no training.
     """
-    read = [read_training(folder) for folder in trainings]
-    read.sort(key=lambda pair: place_of(pair[0].algorithm))
-    first = read[0][0]
+    found = [(*read_training(folder), folder) for folder in trainings]
+    first = found[0][0]
     setting = (first.task, first.robot, first.level)
-    for folder, (config, _) in zip(trainings, read, strict=True):
+    for config, _, folder in found:
         if (config.task, config.robot, config.level) != setting:
             reason = f"{config.task} {config.robot} {config.level} is not {' '.join(setting)}: draw them apart"
             raise BadConfig(folder / CONFIG, "task", reason)
+    read = labeled([(config, curves) for config, curves, _ in found])
     lines = lines_of(run, setting) if run else {}
-    stepping = {config.algorithm: (config.algorithm, curves) for config, curves in read if config.algorithm != "bc"}
-    for config, curves in read:
+    stepping = {}
+    for label, (config, curves) in read.items():
         if config.algorithm == "bc":
-            share = sum(points[-1].success for points in curves) / len(curves)
-            lines["bc"] = Line("bc", share)
+            lines[label] = Line("bc", summary_rows(curves)[-1][1])
+        else:
+            stepping[label] = config.algorithm, curves
     output.mkdir(parents=True, exist_ok=True)
     stem = output / f"curves-{first.task.replace('_', '-')}-{first.robot.lower()}"
     files = draw_curves(stepping, stem, f"{first.task}, {first.level}", lines) if stepping else []
@@ -65,7 +70,17 @@ def run_curves(trainings: list[Path], run: Path | None, output: Path) -> None:
         console().print(str(file))
 
 
-def read_training(folder: Path) -> tuple[TrainConfig, Curves]:
+def labeled(read: list[Trained]) -> dict[str, Trained]:
+    """By algorithm, in the order of tables; where there are several of one, by name and digest."""
+    several = Counter(config.algorithm for config, _ in read)
+    read = sorted(read, key=lambda pair: place_of(pair[0].algorithm))
+    return {
+        config.algorithm if several[config.algorithm] == 1 else f"{config.name} {config.digest()[:4]}": (config, curves)
+        for config, curves in read
+    }
+
+
+def read_training(folder: Path) -> Trained:
     """The config of a training's folder, and the evaluations of its seeds so far.
 
     Raises:
@@ -97,10 +112,10 @@ def lines_of(run: Path, setting: tuple[str, str, str]) -> dict[str, Line]:
     return {label: Line(group.cell.method, group.success.share) for label, group in found.items()}
 
 
-def table_of(read: list[tuple[TrainConfig, Curves]]) -> Table:
+def table_of(read: dict[str, Trained]) -> Table:
     """Each training at its end, or as far as all of its seeds have come."""
     rows: list[list[Entry]] = []
-    for config, curves in read:
+    for label, (config, curves) in read.items():
         steps, share, *_, middle, bottom, top = summary_rows(curves)[-1]
         last = [points[min(map(len, curves)) - 1] for points in curves]
         low, high = mean_interval([point.successes for point in last])
@@ -108,16 +123,16 @@ def table_of(read: list[tuple[TrainConfig, Curves]]) -> Table:
         counted = "0" if config.algorithm == "bc" else f"{steps:,}".replace(",", " ")
         success = f"{share:.0%} of {sum(len(point.successes) for point in last)}", f"{low:.0%} to {high:.0%}"
         earned = f"{middle:.1f}", f"{bottom:.1f} to {top:.1f}"
-        rows.append([config.algorithm, counted, str(len(last)), *success, *earned, f"{minutes:.0f}"])
+        rows.append([label, counted, str(len(last)), *success, *earned, f"{minutes:.0f}"])
     return Table(list(HEAD), rows, 1)
 
 
-def csv_of(read: list[tuple[TrainConfig, Curves]]) -> str:
-    """All evaluations that all seeds have had."""
+def csv_of(read: dict[str, Trained]) -> str:
+    """All evaluations that all seeds have had; steps of "bc" are of the gradient."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
-    for config, curves in read:
+    for label, (_, curves) in read.items():
         for steps, *numbers in summary_rows(curves):
-            rows.writerow([config.algorithm, int(steps), len(curves), *(f"{number:.4f}" for number in numbers)])
+            rows.writerow([label, int(steps), len(curves), *(f"{number:.4f}" for number in numbers)])
     return text.getvalue()
