@@ -27,7 +27,8 @@ def _with_actor(cell: RunConfig, grid: Grid) -> RunConfig:
     source = grid.blame("settings")
     try:
         path = actor_file(cell.method, cell.task, cell.robot, str(cell.settings.get("checkpoint", "")))
-        steps = 0 if foreign(path) else load_actor(path).training.steps
+        # a clone's steps are of the gradient
+        steps = 0 if foreign(path) or cell.method == "bc" else load_actor(path).training.steps
     except (BadActor, BadOption) as error:
         raise BadConfig(source, "settings.checkpoint", str(error)) from None
     found, wanted = sha256_of(path) or "", str(cell.settings.get("sha256", ""))
