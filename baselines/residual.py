@@ -22,8 +22,9 @@ from .screw_policy import ScrewPolicy
 METHOD = "residual"
 SCREW_ACTION = "screw_action"
 """Entry of the observation: what the screw policy would do."""
-SHARE = 0.2
-"""How much of a full action a correction can be, unless it is said."""
+SHARE = 0.05
+"""How much of a full action a correction can be, unless it is said: with 0.2, what exploration adds at random keeps the
+screw policy from ever succeeding, and nothing is learned of its successes."""
 
 
 def corrected(action: np.ndarray, correction: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -100,6 +100,10 @@ def made_model(config: TrainConfig, features: Any, normalization: Any) -> Any:
         raise BadConfig(config.name, "learner", str(error).splitlines()[0]) from None
     if config.algorithm == "sac-demo":
         model.replay_buffer.show(*demo_transitions(config, features, normalization))
+    if config.algorithm == "residual":
+        # what has learned nothing corrects nothing (Silver et al., Residual Policy Learning, 2018)
+        for parameter in model.actor.mu.parameters():
+            parameter.data.zero_()
     return model
 
 

@@ -51,6 +51,7 @@ class Trainee:
         env.close()
         self._evaluation = base_env(config, reward="dense", end_on_success=True)
         _seed_all(seed, 0)
+        self._chosen = chosen(config)
         self.model = self._made()
         self.points = [] if (last := last_leg(folder)) is None else self._loaded(last)
 
@@ -79,6 +80,7 @@ class Trainee:
             success=None if last is None else last.success,
             episodes=0 if last is None else len(last.successes),
             seconds=0.0 if last is None else last.seconds,
+            settings={key: value for key, value in self._chosen.items() if isinstance(value, int | float | str)},
         )
         return actor_of(
             self.model.network if config.algorithm == "bc" else self.model,
@@ -96,7 +98,7 @@ class Trainee:
         if config.algorithm != "bc":
             return made_model(config, self.features, self.normalization)
         before, _, actions, *_ = demo_transitions(config, self.features, self.normalization)
-        return Clone(before, actions, chosen(config), config.device)
+        return Clone(before, actions, self._chosen, config.device)
 
     def _train(self, leg: int) -> None:
         _seed_all(self.seed, leg)

@@ -110,7 +110,7 @@ def test_a_correction_is_added_and_cut():
 
 
 def test_the_gripper_is_the_screw_policys(joints):
-    assert default_scale(joints.unwrapped.task) == (*[0.2] * 7, 0.0)
+    assert default_scale(joints.unwrapped.task) == (*[0.05] * 7, 0.0)
 
 
 def test_no_correction_is_the_screw_policy(joints, tmp_path):
