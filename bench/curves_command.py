@@ -29,7 +29,7 @@ HEAD = ("method", "environment steps", "seeds", "success", "95 %", "return", "95
 CAPTION = (
     "Success and return (dense, at most 150; a success counts 1 for each step that it saved) of episodes on frozen "
     "scenarios. Thin: each seed. Thick: all seeds, for returns the interquartile mean of all episodes, with 95 % "
-    "intervals (bootstrap of seeds, then of their episodes). Dotted: what needs no step of the environment."
+    "intervals (bootstrap of seeds, then of their episodes). Dashed: what needs no step of the environment."
 )
 
 Trained = tuple[TrainConfig, Curves]

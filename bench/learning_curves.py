@@ -17,6 +17,8 @@ from .training_points import Point
 
 HEIGHT, COLUMNS = 3.3, 2
 """Of a figure without its legend [inch]; columns of the legend."""
+DASH = 2.0
+"""Length of a dash, in widths of its line."""
 Curves = Sequence[Sequence[Point]]
 """Of each seed its evaluations."""
 
@@ -79,9 +81,11 @@ def draw_curves(
         figure = Figure(figsize=(COLUMN, HEIGHT + LEGEND_ROW * rows), layout="constrained")
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         handles, labels = [], []
-        for label, line in lines.items():
-            style = {"color": look_of(line.method).color, "linewidth": 1.2, "clip_on": False}
-            handles.append(top.axhline(line.share, linestyle=":", **style))
+        for k, (label, line) in enumerate(lines.items()):
+            # dashes that take turns: lines at the same height are all seen
+            dashes = (DASH * k, (DASH, DASH * max(1, len(lines) - 1)))
+            style = {"color": look_of(line.method).color, "linewidth": 1.5, "clip_on": False}
+            handles.append(top.axhline(line.share, linestyle=dashes, **style))
             labels.append(f"{label}, {line.cost}")
         for label, (method, curves) in trainings.items():
             handles.append(_drawn(top, bottom, method, curves))
