@@ -130,15 +130,13 @@ def test_no_correction_is_the_screw_policy(joints, tmp_path):
 
 def test_the_screw_policy_finds_back_from_what_it_was_corrected_by(joints):
     around = AroundScrew(joints, DEMONSTRATION, (*[0.3] * 7, 0.0))
-    done = []
     for size in (0.0, 1.0):
-        observation, _ = around.reset(seed=0)
-        # for a third of a second while it is carried
+        around.reset(seed=0)
+        info = {}
         for k in range(110):
-            push = size if 20 <= k < 27 else 0.0
-            observation, *_, info = around.step(np.full(8, push))
-        done.append((info["success"], observation["joint_positions"]))
-    assert [success for success, _ in done] == [True, True]
+            # for a third of a second while it carries: a quarter of a radian in every joint
+            *_, info = around.step(np.full(8, size if 20 <= k < 27 else 0.0))
+        assert info["success"]
 
 
 def test_what_was_trained_around_the_screw_policy_acts_alike_in_the_benchmark(joints, tmp_path):
