@@ -116,7 +116,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["report", "nowhere"], "nowhere: is not a run folder: there is no such folder"),
         (["report", "a", "b"], "command line: --output: is needed where several runs are compared"),
         (["report"], "Missing argument 'RUN'; usage: onedemo report [OPTIONS]"),
-        (["fly"], "No such command 'fly'; onedemo knows: run, train, report, plan, reproduce, geometric, "),
+        (["fly"], "No such command 'fly'; onedemo knows: run, train, curves, report, plan, reproduce, "),
         (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
