@@ -8,15 +8,21 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 PACKAGES = ("onedemo", "numpy", "numba", "mujoco", "robosuite", "gymnasium", "pin", "scipy", "matplotlib")
+LEARNING = ("torch", "stable_baselines3")
+"""What a training depends on besides."""
 
 
-def fingerprint() -> dict[str, object]:
-    """What a reader needs to judge whether a run can be repeated bit by bit."""
+def fingerprint(*more: str) -> dict[str, object]:
+    """What a reader needs to judge whether a run can be repeated bit by bit.
+
+    Args:
+        more: packages that count besides.
+    """
     return {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
         "processor": _processor(),
-        "packages": {name: _version(name) for name in PACKAGES},
+        "packages": {name: _version(name) for name in (*PACKAGES, *more)},
         "commit": _commit(),
     }
 

@@ -16,7 +16,7 @@ from ..planner.errors import BadConfig
 from .comparison import WorkerFailed
 from .console import console, labeled
 from .dispatch import Dispatcher, Executor, Job
-from .environment import fingerprint
+from .environment import LEARNING, fingerprint
 from .executors import Serial, cores
 from .files import write_whole
 from .run_folder import LOG, open_folder
@@ -152,4 +152,6 @@ def _path(config: str) -> Path:
 def _describe(config: TrainConfig, folder: Path, command: str) -> None:
     """Write what the training is."""
     write_whole(folder / CONFIG, json.dumps(config.model_dump(mode="json"), indent=1) + "\n")
-    write_whole(folder / "environment.json", json.dumps({**fingerprint(), "command": command}, indent=2) + "\n")
+    write_whole(
+        folder / "environment.json", json.dumps({**fingerprint(*LEARNING), "command": command}, indent=2) + "\n"
+    )
