@@ -16,6 +16,9 @@ FILE = "scenarios.json"
 VERSION = 1
 PLACE = ("task", "robot", "level", "obstacles", "env", "seed")
 """Keys of a cell that decide from what its scenarios are drawn."""
+HOW = ("control_mode", "reward")
+"""Arguments of environments that say how one acts and is paid, not where one starts: with others, scenarios are the
+same, and methods that act in different ways are paired."""
 
 
 class ScenarioChanged(OneDemoError):
@@ -51,7 +54,7 @@ def scenarios_of(config: RunConfig) -> list[Scenario]:
 
 def place_of(config: RunConfig) -> str:
     """What the scenarios of a cell are drawn from; cells of the same place are paired."""
-    return canonical({key: getattr(config, key) for key in PLACE})
+    return canonical(_place({key: getattr(config, key) for key in PLACE}))
 
 
 def lists_of(cells: Iterable[RunConfig]) -> list[RunConfig]:
@@ -117,7 +120,12 @@ class Suite:
 
 
 def _key(values: Mapping[str, Any], seed: int, index: int) -> tuple[str, int]:
-    return canonical({**{key: values[key] for key in PLACE}, "seed": seed}), index
+    return canonical({**_place(values), "seed": seed}), index
+
+
+def _place(values: Mapping[str, Any]) -> dict[str, Any]:
+    place = {key: values[key] for key in PLACE}
+    return {**place, "env": {key: value for key, value in place["env"].items() if key not in HOW}}
 
 
 def read_suite(folder: Path) -> Suite | None:

@@ -35,6 +35,7 @@ def suite_of(*cells):
 
 def test_cells_are_paired_unless_their_starts_are_drawn_from_something_else():
     same = [cell(method="a"), cell(settings={"x": 1}), cell(demonstration="d"), cell(max_seconds=3.0), cell(name="y")]
+    same += [cell(env={"control_mode": "ee_twist"}), cell(env={"reward": "dense"})]
     other = [cell(task="t"), cell(robot="r"), cell(level="L2"), cell(obstacles="o"), cell(seed=1), cell(env={"n": 1})]
     assert {place_of(each) for each in same} == {place_of(CELL)}
     assert len({place_of(each) for each in [CELL, *other]}) == 7
