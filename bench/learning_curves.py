@@ -29,12 +29,10 @@ class Line(NamedTuple):
     Attributes:
         method: that it is drawn like.
         share: of successes.
-        cost: what it needs, in words.
     """
 
     method: str
     share: float
-    cost: str = "no step"
 
 
 def mean_interval(groups: Sequence[Sequence[bool]]) -> tuple[float, float]:
@@ -86,7 +84,7 @@ def draw_curves(
             dashes = (DASH * k, (DASH, DASH * max(1, len(lines) - 1)))
             style = {"color": look_of(line.method).color, "linewidth": 1.5, "clip_on": False}
             handles.append(top.axhline(line.share, linestyle=dashes, **style))
-            labels.append(f"{label}, {line.cost}")
+            labels.append(f"{label}, no step")
         for label, (method, curves) in trainings.items():
             handles.append(_drawn(top, bottom, method, curves))
             labels.append(f"{label} ({len(curves)} seed{'s' * (len(curves) != 1)})")
