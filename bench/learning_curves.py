@@ -72,6 +72,7 @@ def draw_curves(
         lines: what needs no step, by label.
     """
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     lines = lines or {}
     with styled():
@@ -82,8 +83,9 @@ def draw_curves(
         for k, (label, line) in enumerate(lines.items()):
             # dashes that take turns: lines at the same height are all seen
             dashes = (DASH * k, (DASH, DASH * max(1, len(lines) - 1)))
-            style = {"color": look_of(line.method).color, "linewidth": 1.5, "clip_on": False}
-            handles.append(top.axhline(line.share, linestyle=dashes, **style))
+            style = {"color": look_of(line.method).color, "linewidth": 1.5}
+            top.axhline(line.share, linestyle=dashes, clip_on=False, **style)
+            handles.append(Line2D([], [], linestyle=(0, (DASH, 0.6 * DASH)), **style))
             labels.append(f"{label}, no step")
         for label, (method, curves) in trainings.items():
             handles.append(_drawn(top, bottom, method, curves))
