@@ -104,13 +104,17 @@ def test_a_shipped_actor_is_what_its_name_says(path):
     assert actor.training.steps > 0 and actor.training.success is not None
 
 
-def test_a_correction_is_added_and_cut():
-    action, correction = np.array([0.5, -0.9, 0.0]), np.array([1.0, -1.0, 1.0], dtype=np.float32)
-    np.testing.assert_allclose(corrected(action, correction, np.array([0.2, 0.2, 0.0])), [0.7, -1.0, 0.0])
+def test_a_correction_is_as_fast_as_what_it_corrects_and_cut():
+    action, correction = np.array([0.5, -0.9, 1.0]), np.array([1.0, -1.0, 1.0], dtype=np.float32)
+    scale = np.array([0.2, 0.2, 0.0])
+    np.testing.assert_allclose(corrected(action, correction, scale), [0.68, -1.0, 1.0])
+    still = np.array([0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(corrected(still, correction, scale), still)
+    np.testing.assert_array_equal(corrected(action, correction, np.zeros(3)), action)
 
 
 def test_the_gripper_is_the_screw_policys(joints):
-    assert default_scale(joints.unwrapped.task) == (*[0.02] * 7, 0.0)
+    assert default_scale(joints.unwrapped.task) == (*[0.1] * 7, 0.0)
 
 
 def test_no_correction_is_the_screw_policy(joints, tmp_path):
@@ -129,7 +133,7 @@ def test_no_correction_is_the_screw_policy(joints, tmp_path):
 
 
 def test_the_screw_policy_finds_back_from_what_it_was_corrected_by(joints):
-    around = AroundScrew(joints, DEMONSTRATION, (*[0.3] * 7, 0.0))
+    around = AroundScrew(joints, DEMONSTRATION, (*[1.0] * 7, 0.0))
     for size in (0.0, 1.0):
         around.reset(seed=0)
         info = {}
