@@ -61,8 +61,8 @@ class Actor:
         features: what it sees.
         normalization: of the features.
         network: from scaled features to an action in [-1, 1].
-        residual_scale: per entry of the action, how much of the network's is added to another policy's; (): the
-            network's action is the action.
+        residual_scale: per entry of the action, how much of the network's is added to another policy's, times the
+            speed of its fastest joint, see `residual.corrected`; (): the network's action is the action.
         config_hash: of the settings of its training, "" if there are none.
         versions: of the packages it was trained with, by name.
         training: see `Training`.

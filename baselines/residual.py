@@ -61,7 +61,8 @@ class AroundScrew(gym.Wrapper, gym.utils.RecordConstructorArgs):
     Args:
         env: of ours, in the control mode `joint_velocity`.
         demonstration: the ONE demonstration.
-        scale: per entry of the action, how much of a correction is added; None: `default_scale`.
+        scale: per entry of the action, how fast a correction can be, of the fastest joint that is corrected; None:
+            `default_scale`.
 
     Attributes:
         scale: see the arguments.

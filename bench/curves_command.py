@@ -49,7 +49,7 @@ def run_curves(trainings: list[Path], run: Path | None, output: Path) -> None:
         if (config.task, config.robot, config.level) != setting:
             reason = f"{config.task} {config.robot} {config.level} is not {' '.join(setting)}: draw them apart"
             raise BadConfig(folder / CONFIG, "task", reason)
-    read = labeled([(config, curves) for config, curves, _ in found])
+    read = by_label([(config, curves) for config, curves, _ in found])
     lines = lines_of(run, setting) if run else {}
     stepping = {}
     for label, (config, curves) in read.items():
@@ -70,7 +70,7 @@ def run_curves(trainings: list[Path], run: Path | None, output: Path) -> None:
         console().print(str(file))
 
 
-def labeled(read: list[Trained]) -> dict[str, Trained]:
+def by_label(read: list[Trained]) -> dict[str, Trained]:
     """By algorithm, in the order of tables; where there are several of one, by name and digest."""
     several = Counter(config.algorithm for config, _ in read)
     read = sorted(read, key=lambda pair: place_of(pair[0].algorithm))
