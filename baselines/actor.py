@@ -106,16 +106,17 @@ class Actor:
     def misfit(self, method: str, task: TaskDescription) -> tuple[str, str] | None:
         """Of what is known of a task beforehand, the first thing this actor is not made for: its key and a reason."""
         entries = len(task.arms) * ((TWIST if task.control_mode == "ee_twist" else task.arms[0].dof) + 1)
-        for key, own, wanted, unit in (
-            ("method", self.method, method, ""),
-            ("task", self.task, task.name, ""),
-            ("robot", self.robot, task.robot, ""),
-            ("control.mode", self.control_mode, task.control_mode, ""),
-            ("control.frequency", self.frequency, frequency_of(task), " Hz"),
-            ("action.shape", (self.actions,), (entries,), ""),
+        for key, own, wanted, unit, argument in (
+            ("method", self.method, method, "", ""),
+            ("task", self.task, task.name, "", ""),
+            ("robot", self.robot, task.robot, "", ""),
+            ("control.mode", self.control_mode, task.control_mode, "", "control_mode"),
+            ("control.frequency", self.frequency, frequency_of(task), " Hz", "control_frequency"),
+            ("action.shape", (self.actions,), (entries,), "", ""),
         ):
             if own != wanted:
-                return key, f"is {own!r}{unit}; wanted is {wanted!r}{unit}"
+                remedy = f": it acts with the environment's {argument}={own}" if argument else ""
+                return key, f"is {own!r}{unit}; wanted is {wanted!r}{unit}{remedy}"
         arms, objects = len(task.arms), len(task.objects)
         known = {"joint_positions": (arms, task.arms[0].dof), "tcp_pose": (arms, 7), "object_pose": (objects, 7)}
         return self.unseen(known, partly=True)

@@ -127,9 +127,11 @@ def actor_file(method: str, task: str, robot: str, checkpoint: str) -> Path:
     except UnknownName as error:
         if checkpoint:
             return Path(checkpoint)
-        shipped = ", ".join(str(known) for known in error.known) or "none"
-        reason = f"no actor is shipped for {method!r} on {task} with {robot}; name a file (docs/learning.md)"
-        raise BadOption("checkpoint", f"{reason}; shipped: {shipped}") from None
+        place = f"-{task}-{robot}"
+        shipped = [str(known).removesuffix(place) for known in error.known if str(known).endswith(place)]
+        there = f" (shipped: {', '.join(shipped)})" if shipped else ""
+        reason = f"no actor is shipped for {method!r} on {task} with {robot}{there}; name a file (docs/learning.md)"
+        raise BadOption("checkpoint", reason) from None
 
 
 def sha256_of(path: Path) -> str | None:

@@ -30,7 +30,8 @@ def _with_actor(cell: RunConfig, grid: Grid) -> RunConfig:
         # a clone's steps are of the gradient
         steps = 0 if foreign(path) or cell.method == "bc" else load_actor(path).training.steps
     except (BadActor, BadOption) as error:
-        raise BadConfig(source, "settings.checkpoint", str(error)) from None
+        reason = error.reason if isinstance(error, BadOption) else str(error)
+        raise BadConfig(source, "settings.checkpoint", reason) from None
     found, wanted = sha256_of(path) or "", str(cell.settings.get("sha256", ""))
     if not found.startswith(wanted):
         raise BadConfig(source, "settings.sha256", f"{wanted} is wanted; {path} has {found[:DIGITS]}")

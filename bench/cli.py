@@ -10,8 +10,9 @@ import typer
 
 from . import demo_commands
 from .console import console, labeled, missing_library
+from .ending import INTERRUPTED
 
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT = 2
 USAGE: Any = typer.BadParameter.__base__
 """What typer raises for a wrong command line; of typer itself or of click, as the version has it."""
 app = typer.Typer(

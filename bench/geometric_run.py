@@ -15,6 +15,7 @@ from ..planner.errors import BadConfig, UnknownName
 from .comparison import WorkerFailed
 from .console import console, labeled
 from .dispatch import Dispatcher, Job
+from .ending import INTERRUPTED
 from .executors import cores
 from .files import canonical, sha256_of
 from .geometric_suite import LEVELS, GeometricSuite, cells, read_suite
@@ -30,7 +31,6 @@ SPARSE_EACH, FRAMES_EACH = 12, 6
 """Scenarios for each part and level of these tracks, at most."""
 EXTRAS = {"dmp-goal": "movement_primitives", "dmp-world": "movement_primitives", "rrt": "ompl"}
 """Modules that path makers need."""
-INTERRUPTED = 130
 
 
 class Order(NamedTuple):

@@ -15,7 +15,8 @@ from .actors_used import with_actors
 from .board import Board
 from .checks import check_grid
 from .comparison import Comparison
-from .console import console, labeled
+from .console import console
+from .ending import ended
 from .executors import executor_for
 from .finishing import film, report, show
 from .run_folder import (
@@ -29,7 +30,6 @@ from .run_folder import (
 )
 from .scenarios import read_suite
 
-DISK_FULL, INTERRUPTED = 3, 130
 SHIPPED_FOLDERS = (".", os.path.join("configs", "bench"))
 
 
@@ -62,24 +62,14 @@ def run_config(
     grid = with_actors(grid)
     folder = output / f"{grid.name}-{grid.digest()}"
     err = console(stderr=True, quiet=quiet)
-    try:
+
+    def work() -> list[str]:
         with ExitStack() as held:
             open_folder(folder, held, part.name)
             describe(grid, folder, shlex.join(["onedemo", "run", config, *overrides]))
-            lines = _completed(Comparison(grid, folder, Board(grid, err), part, retry=retry), err)
-    except KeyboardInterrupt:
-        err.print(f"stopped; finished episodes are kept in {folder}, running the same again goes on")
-        return INTERRUPTED
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        text = f"{folder}: {reason}; finished episodes are kept, running the same again goes on"
-        console(stderr=True).print(labeled("error", "red", text))
-        return DISK_FULL
-    out = console(quiet=quiet)
-    for line in lines:
-        out.print(line)
-    console().print(str(folder))
-    return 0
+            return _completed(Comparison(grid, folder, Board(grid, err), part, retry=retry), err)
+
+    return ended(work, folder, "finished episodes", quiet=quiet)
 
 
 def config_path(config: str) -> Path:

@@ -14,15 +14,14 @@ from ..configs.shipped import shipped_training
 from ..configs.training import TrainConfig, load_training
 from ..planner.errors import BadConfig
 from .comparison import WorkerFailed
-from .console import console, labeled
+from .console import console
 from .dispatch import Dispatcher, Executor, Job
+from .ending import ended
 from .environment import LEARNING, fingerprint
 from .executors import Serial, cores
 from .files import write_whole
 from .run_folder import LOG, open_folder
 from .training_folder import CONFIG, SEED, curve_of, seeds_of, write_curves
-
-INTERRUPTED, DISK_FULL = 130, 3
 
 
 def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
@@ -43,26 +42,16 @@ def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool
     check(chosen)
     folder = output / f"{chosen.name}-{chosen.digest()}"
     err = console(stderr=True, quiet=quiet)
-    try:
+
+    def work() -> list[str]:
         with ExitStack() as held:
             open_folder(folder, held)
             _describe(chosen, folder, shlex.join(["onedemo", "train", config, *overrides]))
             with _executor(chosen, folder) as executor:
                 train(chosen, folder, executor, err)
-            lines = write_curves(chosen, folder)
-    except KeyboardInterrupt:
-        err.print(f"stopped; all is kept in {folder} up to the last evaluations, the same command goes on")
-        return INTERRUPTED
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        text = f"{folder}: {reason}; what was evaluated is kept, the same command goes on"
-        console(stderr=True).print(labeled("error", "red", text))
-        return DISK_FULL
-    out = console(quiet=quiet)
-    for line in lines:
-        out.print(line)
-    console().print(str(folder))
-    return 0
+            return write_curves(chosen, folder)
+
+    return ended(work, folder, "finished evaluations and what was learned by then", quiet=quiet)
 
 
 def check(config: TrainConfig) -> None:

@@ -10,6 +10,8 @@ import os
 import shutil
 import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -59,10 +61,14 @@ class Trainee:
         """Train and evaluate once more, and keep what came of it."""
         begun, before = time.perf_counter(), self.points[-1].seconds if self.points else 0.0
         leg = len(self.points) + 1
-        self._train(leg)
-        actor = self.actor()
-        successes, returns = evaluated(self.config, actor, self._evaluation)
-        steps = int(self.model.num_timesteps)
+        with self._events(leg) as logger:
+            self._train(leg, logger)
+            steps = int(self.model.num_timesteps)
+            successes, returns = evaluated(self.config, self.actor(), self._evaluation)
+            # the names that evaluations have everywhere in Stable-Baselines3
+            logger.record("eval/success_rate", float(np.mean(successes)))
+            logger.record("eval/mean_reward", float(np.mean(returns)))
+            logger.dump(steps)
         seconds = before + time.perf_counter() - begun
         point = Point(self.seed, leg, steps, successes, returns, round(seconds, 3))
         self.points.append(point)
@@ -100,14 +106,13 @@ class Trainee:
         before, _, actions, *_ = demo_transitions(config, self.features, self.normalization)
         return Clone(before, actions, self._chosen, config.device)
 
-    def _train(self, leg: int) -> None:
+    def _train(self, leg: int, logger: Any) -> None:
         _seed_all(self.seed, leg)
         if self.config.algorithm == "bc":
             self.model.learn(self.config.evaluate_every)
+            logger.record("train/loss", self.model.loss)
             return
-        configure: Any = needed("stable_baselines3.common.logger", EXTRA).configure
-        events = self.folder / "tensorboard" / f".{leg}"
-        self.model.set_logger(configure(str(events), ["tensorboard"]))
+        self.model.set_logger(logger)
         self.model.set_random_seed(_leg_seed(self.seed, leg))
         self.model._last_obs = None
         with warnings.catch_warnings():
@@ -115,7 +120,18 @@ class Trainee:
             if hasattr(getattr(self.model, "replay_buffer", None), "truncate_last_trajectory"):
                 self.model.replay_buffer.truncate_last_trajectory()
             self.model.learn(self.config.evaluate_every, reset_num_timesteps=False, log_interval=10)
-        self.model.logger.close()
+
+    @contextmanager
+    def _events(self, leg: int) -> Iterator[Any]:
+        """A logger for TensorBoard; what it wrote is shown with the legs before once this one is over."""
+        configure: Any = needed("stable_baselines3.common.logger", EXTRA).configure
+        events = self.folder / "tensorboard" / f".{leg}"
+        shutil.rmtree(events, ignore_errors=True)
+        logger = configure(str(events), ["tensorboard"])
+        try:
+            yield logger
+        finally:
+            logger.close()
         for file in events.iterdir():
             file.replace(events.parent / f"{file.name}.{leg}")
         events.rmdir()

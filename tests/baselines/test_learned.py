@@ -65,8 +65,8 @@ def test_the_action_is_the_actors(env):
         ("PlaceOne", {}, "ppo", "method: is 'sac'; wanted is 'ppo'"),
         ("Reach", {}, "sac", "task: is 'place_one'; wanted is 'reach'"),
         ("PlaceOne", {"robot": "Sawyer"}, "sac", "robot: is 'Panda'; wanted is 'Sawyer'"),
-        ("PlaceOne", JOINTS, "sac", "control.mode: is 'ee_twist'; wanted is 'joint_velocity'"),
-        ("PlaceOne", {"control_frequency": 50}, "sac", "control.frequency: is 20 Hz; wanted is 50 Hz"),
+        ("PlaceOne", JOINTS, "sac", "control.mode: is 'ee_twist'; wanted is 'joint_velocity': it acts with"),
+        ("PlaceOne", {"control_frequency": 50}, "sac", "control.frequency: is 20 Hz; wanted is 50 Hz: it acts with"),
         ("PlaceOne", {"onto": "block"}, "sac", r"observation.object_pose: has shape \(1, 7\); here it has \(2, 7\)"),
     ],
 )
@@ -91,6 +91,8 @@ def test_where_none_is_shipped_that_is_said(env):
     with pytest.raises(BadOption, match="no actor is shipped for 'sac-demo' on place_one with Sawyer; name a file"):
         task = replace(env.unwrapped.task, robot="Sawyer")
         make_policy("sac-demo", task, DEMONSTRATION)
+    with pytest.raises(BadOption, match=r"place_one with Panda \(shipped: bc, residual, sac-demo, sac\); name"):
+        made(env, "ppo", "")
     with pytest.raises(BadActor, match=r"nowhere\.json: file: does not exist"):
         made(env, "sac", "nowhere")
     with pytest.raises(BadConfig, match="checkpont: unknown key; allowed: checkpoint, allow_pickle"):

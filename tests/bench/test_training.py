@@ -88,6 +88,21 @@ def test_a_training_that_goes_on_ends_as_one_that_never_stopped(algorithm, tmp_p
     assert results(parts) == results(whole)
     assert (parts / "actor.safetensors").read_bytes() == (whole / "actor.safetensors").read_bytes()
     assert (whole / "curve.png").exists() and (whole / "curve.csv").read_text().count("\n") == 3
+    for name, key in (("success_rate", "successes"), ("mean_reward", "returns")):
+        steps, values = events(parts / "seed-0" / "tensorboard", f"eval/{name}")
+        assert steps == [300, 600]
+        assert values == pytest.approx([np.mean(point[key]) for point in results(parts)])
+
+
+def events(folder, name):
+    """Steps and values of a scalar, as TensorBoard shows them."""
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    assert not [path for path in folder.iterdir() if path.is_dir()], "a leg that is over is shown as a run of its own"
+    seen = EventAccumulator(str(folder))
+    seen.Reload()
+    scalars = seen.Scalars(name)
+    return [scalar.step for scalar in scalars], [scalar.value for scalar in scalars]
 
 
 def test_an_actor_acts_in_a_comparison_as_it_was_evaluated(tmp_path):
