@@ -4,135 +4,128 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
-
-from pydantic import ValidationError
 
 from ..baselines.learned import METHODS
 from ..baselines.residual import METHOD as RESIDUAL
-from ..configs.training import TrainConfig
 from ..planner.errors import BadConfig
-from .console import COMMAND_LINE, console
+from .console import COMMAND_LINE, console, labeled
 from .document import Block, Document, Entry, Picture, Pictures, Table
 from .files import write_whole
-from .groups import groups_of
-from .learning_curves import Curves, Line, draw_curves, mean_interval, summary_rows
+from .groups import Rate, groups_of
+from .learning_curves import Line, draw_curves, mean_interval, summary_rows
 from .markdown_page import markdown_of
-from .methods import place_of
 from .run_reading import read_run
-from .training_folder import CONFIG, curve_of, seeds_of
+from .training_folder import CONFIG
+from .trainings import Training, by_label, read_training
 
 COLUMNS = ("method", "steps", "seeds", "success", "low", "high", "return", "return_low", "return_high")
 HEAD = ("method", "environment steps", "seeds", "success", "95 %", "return", "95 %", "minutes a seed")
 CAPTION = (
-    "Success and return (dense, at most 150; a success counts 1 for each step that it saved) of episodes on frozen "
-    "scenarios. Thin: each seed. Thick: all seeds, for returns the interquartile mean of all episodes, with 95 % "
-    "intervals (bootstrap of seeds, then of their episodes). Dashed: what needs no step of the environment."
+    "Success and return of episodes on frozen scenarios. Returns are sums of the dense reward, at most 150; what is "
+    "left of an episode after its success counts 1 a step. Thin: each seed. Thick: all seeds, for returns the "
+    "interquartile mean of all episodes, with 95 % intervals (bootstrap of seeds, then of their episodes). Dashed: "
+    "what needs no step of the environment."
 )
 
-Trained = tuple[TrainConfig, Curves]
-"""A training's config, and the evaluations of each seed."""
 
-
-def run_curves(trainings: list[Path], run: Path | None, output: Path) -> None:
+def run_curves(folders: list[Path], run: Path | None, output: Path) -> None:
     """Draw the curves, write their numbers, and say where they are.
 
     Raises:
-        BadConfig: a folder is of no training or of another task, or the run has no method that needs no training.
+        BadConfig: a folder is of no training or of another task, nothing has been evaluated, or the run has no method
+            that needs no training.
     """
-    found = [(*read_training(folder), folder) for folder in trainings]
-    first = found[0][0]
-    setting = (first.task, first.robot, first.level)
-    for config, _, folder in found:
-        if (config.task, config.robot, config.level) != setting:
-            reason = f"{config.task} {config.robot} {config.level} is not {' '.join(setting)}: draw them apart"
-            raise BadConfig(folder / CONFIG, "task", reason)
-    read = by_label([(config, curves) for config, curves, _ in found])
-    lines = lines_of(run, setting) if run else {}
+    found = evaluated([read_training(folder) for folder in {folder.resolve(): folder for folder in folders}.values()])
+    setting = found[0].setting
+    for training in found:
+        if training.setting != setting:
+            reason = f"{' '.join(training.setting)} is not {' '.join(setting)}: draw them apart"
+            raise BadConfig(training.folder / CONFIG, "task", reason)
+    trainings = by_label(found)
+    shown = rates_of(run, setting) if run else {}
+    lines = {label: Line(method, rate.share) for label, (method, rate) in shown.items()}
     stepping = {}
-    for label, (config, curves) in read.items():
-        if config.algorithm == "bc":
-            lines[label] = Line("bc", summary_rows(curves)[-1][1])
+    for label, training in trainings.items():
+        if training.config.algorithm == "bc":
+            lines[label] = Line("bc", summary_rows(training.curves)[-1][1])
         else:
-            stepping[label] = config.algorithm, curves
-    output.mkdir(parents=True, exist_ok=True)
-    stem = output / f"curves-{first.task.replace('_', '-')}-{first.robot.lower()}"
-    files = draw_curves(stepping, stem, f"{first.task}, {first.level}", lines) if stepping else []
-    blocks: list[Block] = [table_of(read)]
+            stepping[label] = training.config.algorithm, training.curves
+    task, robot, level = setting
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "is a file, not a folder" if output.exists() else error.strerror or str(error)
+        raise BadConfig(COMMAND_LINE, "--output", f"{output}: {reason}") from None
+    stem = output / f"curves-{task.replace('_', '-')}-{robot.lower()}"
+    files = draw_curves(stepping, stem, f"{task}, {robot}, {level}", lines) if stepping else []
+    blocks: list[Block] = [table_of(trainings, {label: rate for label, (_, rate) in shown.items()})]
     if files:
         blocks.append(Pictures([Picture(files[0].name, b"", "success and return against steps")], CAPTION))
-    title = f"{first.task}, {first.robot}, {first.level}: one demonstration, or N steps"
-    write_whole(stem.with_suffix(".csv"), csv_of(read))
+    title = f"{task}, {robot}, {level}: one demonstration, or N steps"
+    write_whole(stem.with_suffix(".csv"), csv_of(trainings))
     write_whole(stem.with_suffix(".md"), markdown_of(Document(title, blocks)))
     for file in (*files, stem.with_suffix(".csv"), stem.with_suffix(".md")):
         console().print(str(file))
 
 
-def by_label(read: list[Trained]) -> dict[str, Trained]:
-    """By algorithm, in the order of tables; where there are several of one, by name and digest."""
-    several = Counter(config.algorithm for config, _ in read)
-    read = sorted(read, key=lambda pair: place_of(pair[0].algorithm))
-    return {
-        config.algorithm if several[config.algorithm] == 1 else f"{config.name} {config.digest()[:4]}": (config, curves)
-        for config, curves in read
-    }
-
-
-def read_training(folder: Path) -> Trained:
-    """The config of a training's folder, and the evaluations of its seeds so far.
+def evaluated(trainings: list[Training]) -> list[Training]:
+    """Those with an evaluation; the others are named on standard error.
 
     Raises:
-        BadConfig: it is none, or nothing has been evaluated.
+        BadConfig: there are none.
     """
-    file = folder / CONFIG
-    try:
-        config = TrainConfig.model_validate(json.loads(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError, ValidationError) as error:
-        raise BadConfig(
-            file, "", f"is not a training's ({type(error).__name__}); give a folder of onedemo train"
-        ) from None
-    curves = [points for seed in seeds_of(config) if (points := curve_of(folder, seed))]
-    if not curves:
-        raise BadConfig(folder, "", "nothing has been evaluated yet")
-    return config, curves
+    found = [training for training in trainings if training.curves]
+    if not found:
+        raise BadConfig(trainings[0].folder, "", "nothing has been evaluated yet")
+    for training in trainings:
+        if not training.curves:
+            text = f"{training.folder}: nothing has been evaluated yet"
+            console(stderr=True).print(labeled("left out", "yellow", text))
+    return found
 
 
-def lines_of(run: Path, setting: tuple[str, str, str]) -> dict[str, Line]:
-    """The methods of a run on a setting that need no training.
+def rates_of(run: Path, setting: tuple[str, str, str]) -> dict[str, tuple[str, Rate]]:
+    """The methods of a run on a setting that need no training, and their successes, by label.
 
     Raises:
         BadConfig: the run has none on it.
     """
-    groups = [group for group in groups_of(read_run(run)) if group.setting == setting and group.records]
-    found = {group.label: group for group in groups if group.cell.method not in (*METHODS, RESIDUAL)}
+    groups = [group for group in groups_of(read_run(run)) if group.records]
+    found = [group for group in groups if group.setting == setting and group.cell.method not in (*METHODS, RESIDUAL)]
     if not found:
-        raise BadConfig(COMMAND_LINE, "--run", f"{run} has no method that needs no training on {' '.join(setting)}")
-    return {label: Line(group.cell.method, group.success.share) for label, group in found.items()}
+        there = ", ".join(sorted({f"{group.label} on {' '.join(group.setting)}" for group in groups})) or "nothing"
+        reason = f"{run} has no method that needs no training on {' '.join(setting)}; there is {there}"
+        raise BadConfig(COMMAND_LINE, "--run", reason)
+    return {group.label: (group.cell.method, group.success) for group in found}
 
 
-def table_of(read: dict[str, Trained]) -> Table:
-    """Each training at its end, or as far as all of its seeds have come."""
-    rows: list[list[Entry]] = []
-    for label, (config, curves) in read.items():
+def table_of(trainings: Mapping[str, Training], shown: Mapping[str, Rate]) -> Table:
+    """What needs no training, then each training at its end, or as far as all of its seeds have come."""
+    rows: list[list[Entry]] = [
+        [label, "0", "", f"{rate.share:.0%} of {rate.episodes}", f"{rate.low:.0%} to {rate.high:.0%}", "", "", ""]
+        for label, rate in shown.items()
+    ]
+    for label, training in trainings.items():
+        curves = training.curves
         steps, share, *_, middle, bottom, top = summary_rows(curves)[-1]
         last = [points[min(map(len, curves)) - 1] for points in curves]
         low, high = mean_interval([point.successes for point in last])
         minutes = sum(point.seconds for point in last) / len(last) / 60.0
-        counted = "0" if config.algorithm == "bc" else f"{steps:,}".replace(",", " ")
+        counted = "0" if training.config.algorithm == "bc" else f"{steps:,}".replace(",", " ")
         success = f"{share:.0%} of {sum(len(point.successes) for point in last)}", f"{low:.0%} to {high:.0%}"
         earned = f"{middle:.1f}", f"{bottom:.1f} to {top:.1f}"
-        rows.append([label, counted, str(len(last)), *success, *earned, f"{minutes:.0f}"])
+        rows.append([label, counted, str(len(last)), *success, *earned, f"{minutes:.{0 if minutes >= 1.0 else 1}f}"])
     return Table(list(HEAD), rows, 1)
 
 
-def csv_of(read: dict[str, Trained]) -> str:
+def csv_of(trainings: Mapping[str, Training]) -> str:
     """All evaluations that all seeds have had; steps of "bc" are of the gradient."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
-    for label, (_, curves) in read.items():
-        for steps, *numbers in summary_rows(curves):
-            rows.writerow([label, int(steps), len(curves), *(f"{number:.4f}" for number in numbers)])
+    for label, training in trainings.items():
+        for steps, *numbers in summary_rows(training.curves):
+            rows.writerow([label, int(steps), len(training.curves), *(f"{number:.4f}" for number in numbers)])
     return text.getvalue()

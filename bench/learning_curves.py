@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,13 +11,15 @@ import numpy as np
 
 from ..envs.subtask import HORIZON
 from .figure_style import COLUMN, LEGEND_ROW, legend_above, saved, styled
-from .methods import look_of
+from .methods import Look, look_of, other_look
 from .rate_figures import share_axis
 from .statistics import hierarchical_bootstrap, interquartile_mean, wilson
 from .training_points import Point
 
 HEIGHT, COLUMNS = 3.3, 2
 """Of a figure without its legend [inch]; columns of the legend."""
+MARGIN = 0.03
+"""Of the axis of successes beyond 0 and 1."""
 DASH = 2.0
 """Length of a dash, in widths of its line."""
 Curves = Sequence[Sequence[Point]]
@@ -87,24 +90,30 @@ def draw_curves(
             top.axhline(line.share, linestyle=dashes, clip_on=False, **style)
             handles.append(Line2D([], [], linestyle=(0, (DASH, 0.6 * DASH)), **style))
             labels.append(f"{label}, no step")
+        drawn: Counter[str] = Counter()
         for label, (method, curves) in trainings.items():
-            handles.append(_drawn(top, bottom, method, curves))
+            handles.append(_drawn(top, bottom, other_look(method, drawn[method]), curves))
+            drawn[method] += 1
             labels.append(f"{label} ({len(curves)} seed{'s' * (len(curves) != 1)})")
         counted = "gradient" if all(method == "bc" for method, _ in trainings.values()) else "environment"
         top.set(title=title)
         bottom.set(xlabel=f"{counted} steps", xlim=(0, None), ylim=(0, HORIZON), ylabel="return")
-        bottom.set_yticks((0, HORIZON // 2, HORIZON))
+        bottom.set_yticks(range(0, HORIZON + 1, HORIZON // 3))
         bottom.grid(False, axis="x")
-        bottom.xaxis.set_major_formatter(lambda value, _: f"{value / 1e3:g}k" if value else "0")
+        thousands = bottom.get_xlim()[1] >= 5e3
+        bottom.xaxis.set_major_formatter(lambda value, _: f"{value / 1e3:g}k" if thousands and value else f"{value:g}")
+        bottom.locator_params(axis="x", nbins=6)
         share_axis(top, "success")
+        # none and all are what is looked for most: not on the frame
+        top.set_ylim(-MARGIN, 1.0 + MARGIN)
         legend_above(figure, handles, labels, COLUMNS)
         saved(figure, stem)
     return [stem.with_suffix(suffix) for suffix in (".png", ".pdf")]
 
 
-def _drawn(top: Any, bottom: Any, method: str, curves: Curves) -> Any:
+def _drawn(top: Any, bottom: Any, look: Look, curves: Curves) -> Any:
     """For successes and for returns a thin line for each seed, a thick one for all, its interval; the handle."""
-    look, rows = look_of(method), np.array(summary_rows(curves)).reshape(-1, 7)
+    rows = np.array(summary_rows(curves)).reshape(-1, 7)
     style = {"color": look.color, "marker": look.marker, "linestyle": look.line, "linewidth": 1.5, "markersize": 3.0}
     line = None
     for axes, column in ((top, 1), (bottom, 4)):

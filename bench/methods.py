@@ -60,6 +60,13 @@ def look_of(method: str) -> Look:
     return Look(SPARE[number % len(SPARE)], "osD^vP"[number // 7 % 6], ":")
 
 
+def other_look(method: str, number: int) -> Look:
+    """The look of the (number + 1)-th line of a method in one figure: the first one's is the method's own."""
+    if number == 0:
+        return look_of(method)
+    return Look(SPARE[(number - 1) % len(SPARE)], "osD^vP"[(number - 1) % 6], (":", "-.")[(number - 1) // 6 % 2])
+
+
 def place_of(method: str) -> tuple[int, str]:
     """Sorting key of a method."""
     known = list(LOOKS)

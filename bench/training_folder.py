@@ -68,7 +68,8 @@ def write_curves(config: TrainConfig, folder: Path) -> list[str]:
             found = (number, sum(point.successes), f"{point.success:.4f}", f"{mean:.3f}", point.seconds)
             rows.writerow([seed, point.steps, *found])
     write_whole(folder / CURVE, text.getvalue())
-    files = draw_curves({config.name: (config.algorithm, list(curves.values()))}, folder / "curve", config.task)
+    title = f"{config.task}, {config.robot}, {config.level}"
+    files = draw_curves({config.algorithm: (config.algorithm, list(curves.values()))}, folder / "curve", title)
     best = actor_of_best(folder, curves)
     ends = [points[-1] for points in curves.values() if points]
     low, high = mean_interval([point.successes for point in ends])

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+import re
+import shutil
 from dataclasses import asdict
 
 import pytest
 from example_runs import small_run
 
 from onedemo.bench.curves_command import run_curves
+from onedemo.bench.methods import look_of, other_look
 from onedemo.bench.training_points import LEG, NUMBERS, Point
 from onedemo.configs.training import TrainConfig
 from onedemo.planner.errors import BadConfig
@@ -63,7 +66,31 @@ def test_trainings_by_one_algorithm_are_told_apart(tmp_path):
     folders = [training(tmp_path / "a"), training(tmp_path / "b", learner={"gamma": 0.9})]
     run_curves(folders, None, tmp_path / "out")
     names = {row["method"] for row in rows_of(tmp_path / "out")}
-    assert len(names) == 2 and all(name.startswith("sac ") and len(name) == 8 for name in names)
+    assert names == {"sac, gamma 0.95", "sac, gamma 0.9"}
+    assert other_look("sac", 0) == look_of("sac")
+    assert len({(look.color, look.marker) for look in (other_look("sac", k) for k in range(6))}) == 6
+
+
+def test_the_same_training_elsewhere_is_named_by_its_folder_and_drawn_once(tmp_path):
+    folders = [training(tmp_path / "a"), training(tmp_path / "b")]
+    run_curves([*folders, folders[0]], None, tmp_path / "out")
+    assert {row["method"] for row in rows_of(tmp_path / "out")} == {f"sac ({folder})" for folder in folders}
+
+
+def test_what_has_not_been_evaluated_is_left_out_and_named(tmp_path, capsys):
+    begun = training(tmp_path / "begun", "ppo", ((0.0,),))
+    shutil.rmtree(begun / "seed-0")
+    run_curves([begun, training(tmp_path / "a")], None, tmp_path / "out")
+    assert {row["method"] for row in rows_of(tmp_path / "out")} == {"sac"}
+    assert "begun: nothing has been evaluated yet" in capsys.readouterr().err
+    with pytest.raises(BadConfig, match="begun: nothing has been evaluated yet"):
+        run_curves([begun], None, tmp_path / "out")
+
+
+def test_a_file_is_no_folder_to_write_to(tmp_path):
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(BadConfig, match=r"--output: .*out: is a file, not a folder"):
+        run_curves([training(tmp_path / "a")], None, tmp_path / "out")
 
 
 def test_what_needs_no_step_is_a_line(tmp_path, monkeypatch):
@@ -78,19 +105,20 @@ def test_what_needs_no_step_is_a_line(tmp_path, monkeypatch):
     assert set(drawn["lines"]) == {"screw", "replay", "rrt", "bc"}
     assert drawn["lines"]["bc"].share == pytest.approx(0.5)
     page = (tmp_path / "out" / "curves-stack-panda.md").read_text()
-    assert "| bc | 0 | 2 | 50% of 20 |" in page
+    assert "| bc | 0 | 2 | 50% of 20 |" in page and re.search(r"\| screw \| 0 \| +\| \d+% of \d+ \|", page)
 
 
 @pytest.mark.parametrize(
     "make, message",
     [
-        (lambda folder: [folder / "nowhere"], r"config\.json: is not a training's \(FileNotFoundError\)"),
+        (lambda folder: [folder / "nowhere"], r"nowhere: there is no such folder; give folders that onedemo train"),
+        (lambda folder: [small_run(folder / "run")], r"run: has no config\.json; give folders that onedemo train"),
         (
             lambda folder: [training(folder / "a"), training(folder / "b", "ppo", task="reach")],
             r"b/config\.json: task: reach Panda L1 is not stack Panda L1: draw them apart",
         ),
     ],
-    ids=["no folder", "another task"],
+    ids=["no folder", "a run", "another task"],
 )
 def test_what_cannot_be_drawn_is_said_in_a_line(make, message, tmp_path):
     with pytest.raises(BadConfig, match=message):
@@ -99,5 +127,7 @@ def test_what_cannot_be_drawn_is_said_in_a_line(make, message, tmp_path):
 
 def test_a_run_without_the_task_is_refused(tmp_path):
     run = small_run(tmp_path / "run")
-    with pytest.raises(BadConfig, match=r"--run: .* has no method that needs no training on reach Panda L1"):
+    with pytest.raises(
+        BadConfig, match=r"--run: .* has no method that needs no training on reach Panda L1; there is .*screw on stack"
+    ):
         run_curves([training(tmp_path / "a", task="reach")], run, tmp_path / "out")
