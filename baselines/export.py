@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box
 
 from ..envs.task import TaskDescription
 from ..planner.demo_io import UNREADABLE
@@ -19,6 +20,7 @@ from .extras import needed
 from .features import Features
 from .flat_features import Normalization
 from .network import ACTIVATIONS, Network
+from .residual import METHOD as RESIDUAL
 
 EXTRA = "rl"
 TRIES, TOLERANCE = 64, 1e-5
@@ -57,6 +59,10 @@ def actor_of(
         MissingExtra: torch is not installed.
     """
     needed("torch", EXTRA)
+    if method == RESIDUAL and not residual_scale:
+        raise BadOption("residual_scale", "is missing: give that of the environment it was trained in, env.scale")
+    if features is None and isinstance(getattr(model, "observation_space", None), Box):
+        raise BadOption("features", "is missing: the model sees a vector; give features and normalization of it")
     if features is None:
         features = Features.raw(getattr(model, "observation_space", None))  # type: ignore[arg-type]
     network = network_of(model)

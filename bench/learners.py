@@ -11,6 +11,7 @@ import numpy as np
 from ..baselines.extras import needed
 from ..baselines.task_episodes import task_episode
 from ..configs.learner_defaults import DEFAULTS
+from ..configs.learner_values import misfit_of
 from ..configs.training import TrainConfig
 from ..envs.subtask import HORIZON
 from ..planner.errors import BadConfig, BadOption
@@ -30,13 +31,15 @@ def chosen(config: TrainConfig) -> dict[str, Any]:
     """All arguments of the learner, checked.
 
     Raises:
-        BadConfig: an argument that it does not have.
+        BadConfig: an argument that it does not have, or a value that it cannot have.
         MissingExtra: Stable-Baselines3 is not installed.
     """
     known = known_arguments(config.algorithm)
     for key in config.learner:
         if key not in known:
             reason = f"{config.algorithm} has no such argument; allowed: {', '.join(sorted(known))}"
+            raise BadConfig(config.name, f"learner.{key}", reason)
+        if reason := misfit_of(key, config.learner[key]):
             raise BadConfig(config.name, f"learner.{key}", reason)
     values = {"envs": 1, **DEFAULTS[config.algorithm], **config.learner}
     if config.algorithm != "ppo" and values["envs"] != 1:

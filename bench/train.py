@@ -12,7 +12,7 @@ from typing import Any
 
 from ..configs.shipped import shipped_training
 from ..configs.training import TrainConfig, load_training
-from ..planner.errors import BadConfig
+from ..planner.errors import BadConfig, UnknownName
 from .comparison import WorkerFailed
 from .console import console
 from .dispatch import Dispatcher, Executor, Job
@@ -20,6 +20,7 @@ from .ending import ended
 from .environment import LEARNING, fingerprint
 from .executors import Serial, cores
 from .files import write_whole
+from .records import HUNG
 from .run_folder import LOG, open_folder
 from .training_folder import CONFIG, SEED, curve_of, seeds_of, write_curves
 
@@ -65,9 +66,15 @@ def check(config: TrainConfig) -> None:
     from .checks import check_training
     from .learners import EXTRA
 
-    needed("torch", EXTRA)
+    torch: Any = needed("torch", EXTRA)
     needed("stable_baselines3", EXTRA)
     check_training(config)
+    try:
+        torch.empty(0, device="cpu" if config.device == "auto" else config.device)
+    except (RuntimeError, AssertionError) as error:
+        # Stable-Baselines3 would train on the processor instead, and say nothing
+        reason = f"torch cannot use {config.device!r} here: {str(error).splitlines()[0]}; auto takes what there is"
+        raise BadConfig(config.name, "device", reason) from None
 
 
 def train(config: TrainConfig, folder: Path, executor: Executor, err: Any) -> None:
@@ -103,7 +110,9 @@ def train(config: TrainConfig, folder: Path, executor: Executor, err: Any) -> No
 def _point(config: TrainConfig, outcome: Any) -> dict[str, Any]:
     answer = outcome.answer
     if answer is None:
-        raise WorkerFailed(f"{config.name}, seed {outcome.job['seed']}: the worker {outcome.lost}, twice; see {LOG}")
+        hung = f"took longer for {config.evaluate_every} steps than wall_seconds, {config.wall_seconds:g},"
+        how = hung if outcome.lost == HUNG else "died"
+        raise WorkerFailed(f"{config.name}, seed {outcome.job['seed']}: a worker {how} twice; see {LOG}")
     if "crash" in answer:
         raise WorkerFailed(f"{config.name}: {answer['crash']}; see {LOG}")
     if "refused" in answer:
@@ -135,7 +144,13 @@ def _executor(config: TrainConfig, folder: Path) -> Executor:
 
 def _path(config: str) -> Path:
     path = Path(config)
-    return path if path.exists() else shipped_training(path.stem if path.suffix in ("", ".yaml") else config)
+    if path.exists():
+        return path
+    try:
+        return shipped_training(path.stem)
+    except UnknownName as error:
+        known = ", ".join(map(str, error.known))
+        raise BadConfig(config, "", f"no such file, and no training that is shipped: {known}") from None
 
 
 def _describe(config: TrainConfig, folder: Path, command: str) -> None:

@@ -99,6 +99,11 @@ def load_training(path: str | Path, overrides: list[str] | None = None) -> Train
         source = COMMAND_LINE if key.split(".")[0] in changed else path
         raise BadConfig(source, key, reason_of(first, TRAIN_KEYS)) from None
     if config.steps % config.evaluate_every:
-        reason = f"{config.steps} is not a multiple of evaluate_every, {config.evaluate_every}"
+        reason = f"{config.steps} is not a multiple of evaluate_every, {config.evaluate_every}: {_nearest(config)}"
         raise BadConfig(COMMAND_LINE if "steps" in changed else path, "steps", reason)
     return config
+
+
+def _nearest(config: TrainConfig) -> str:
+    below, every = config.steps // config.evaluate_every * config.evaluate_every, config.evaluate_every
+    return f"{below} or {below + every}" if below else f"{every}"

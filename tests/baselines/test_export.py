@@ -156,6 +156,10 @@ def test_what_it_has_not_seen_or_is_not_is_refused(env, flat):
     model, task = model_of("PPO", flat), env.unwrapped.task
     with pytest.raises(BadOption, match=r"'features': has \d+ numbers; the model sees \d+"):
         actor_of(model, task, method="ppo", features=Features.of(env.observation_space, relative=False))
+    with pytest.raises(BadOption, match="'features': is missing: the model sees a vector; give features and normal"):
+        actor_of(model, task, method="ppo")
+    with pytest.raises(BadOption, match="'residual_scale': is missing: give that of the environment"):
+        actor_of(model, task, method="residual", features=flat.features)
     with pytest.raises(BadOption, match="is a int; an actor is made of SAC, TQC, PPO"):
         actor_of(3, task, method="ppo", features=flat.features)
     model.policy.mlp_extractor.policy_net.register_forward_hook(lambda module, given, made: 2.0 * made)

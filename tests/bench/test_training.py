@@ -168,13 +168,19 @@ def test_a_damaged_state_is_named_with_what_helps(file, tmp_path):
     [
         ("algoritm=sac", "command line: algoritm: unknown key; did you mean 'algorithm'"),
         ("algorithm=td3", "algorithm: input should be 'sac', 'ppo'"),
-        ("steps=1000", "steps: 1000 is not a multiple of evaluate_every, 300"),
-        ("task=juggle", "task: unknown task 'juggle'; known: stack"),
-        ("task=stack", "task: stack is no task of one object; allowed: insert_one, place_one, reach, tilt_pour"),
+        ("steps=1000", "steps: 1000 is not a multiple of evaluate_every, 300: 900 or 1200"),
+        ("task=juggle", "task: unknown task 'juggle'; known: insert_one, place_one, reach"),
+        ("task=stack", "task: unknown task 'stack'; known: insert_one, place_one, reach, tilt_pour"),
         ("env.reward=sparse", "env.reward: is chosen by the algorithm"),
         ("env.colour=red", "env.colour: onedemo/Reach-v0 has no such argument; allowed: control_mode"),
         ("learner.momentum=1", "learner.momentum: sac has no such argument; allowed: action_noise, batch_size"),
         ("learner.envs=2", "learner.envs: sac has no such argument"),
+        ("learner.hidden=128", "learner.hidden: input should be a valid list, got 128"),
+        ("learner.hidden=[128,-1]", r"learner.hidden: \[1\]: input should be greater than or equal to 1, got -1"),
+        ("learner.learning_rate=fast", "learner.learning_rate: input should be a valid number.*, got 'fast'"),
+        ("learner.gamma=1.5", "learner.gamma: input should be less than or equal to 1, got 1.5"),
+        ("learner.buffer_size=0", "learner.buffer_size: input should be greater than or equal to 1, got 0"),
+        ("device=abacus", "device: torch cannot use 'abacus' here: .*; auto takes what there is"),
         ("demonstration=pour", "task: is 'pour'; the task of this run is 'stack'"),
         ("level=L9", "level: unknown level 'L9'"),
     ],
@@ -184,6 +190,11 @@ def test_mistakes_are_one_line(change, message, tmp_path):
         command.run_training("reach_sac", small("sac", change), tmp_path, quiet=True)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_config_that_is_not_there_is_one_line(tmp_path):
+    with pytest.raises(BadConfig, match=r"nowhere\.yaml: no such file, and no training that is shipped: place_bc, "):
+        command.run_training("nowhere.yaml", [], tmp_path)
 
 
 def test_a_rollout_must_fit_between_evaluations(tmp_path):
