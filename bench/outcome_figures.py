@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..configs.cell import RunConfig
 from .figure_style import FAINT, INK, legend_above, new_figure
 from .groups import SAFE, UNSAFE, rank
 from .methods import look_of
 from .rate_figures import COLUMNS, HEIGHT, Series, share_axis
 from .statistics import median
+from .tasks import TASKS
 
 OUTCOMES = {
     SAFE: ("#dfe7ee", "", "safe success"),
@@ -31,8 +33,6 @@ OUTCOMES = {
 OTHER = ("#444444", "", "other")
 TALLEST = 8.3
 """Of a figure that must fit on a page with its caption [inch]."""
-TICK_MS = 20.0
-"""Time between two ticks at the default 50 Hz."""
 FARTHEST = 120.0
 """Clearances beyond this [mm] are all far."""
 CURVE = 200
@@ -95,24 +95,33 @@ def timing(lines: list[Series]) -> Any | None:
         axes.plot(middle, row, "o", color=color, label="median" if row == 0 else None)
         axes.plot(late, row, "|", color=color, markersize=8, markeredgewidth=1.4)
         axes.plot(most, row, "o", color="white", markeredgecolor=color, markeredgewidth=0.9)
-    axes.axvline(TICK_MS, color=FAINT, linewidth=0.8, linestyle="--", zorder=0)
+    between = sorted({_between(group.cell) for line, _ in known for group in line.groups})
+    for milliseconds in between:
+        axes.axvline(milliseconds, color=FAINT, linewidth=0.8, linestyle="--", zorder=0)
     axes.set(xscale="log", ylim=(len(known) - 0.4, -0.6), xlabel="time per tick [ms]")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_yticks(range(len(known)), [line.label for line, _ in known])
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
-    legend_above(figure, *_timing_legend(), 4)
+    legend_above(figure, *_timing_legend(between), 4)
     return figure
 
 
-def _timing_legend() -> tuple[list[Any], list[str]]:
+def _between(cell: RunConfig) -> float:
+    """Time between two ticks [ms]."""
+    return 1e3 / int(cell.env.get("control_frequency", TASKS[cell.task].frequency))
+
+
+def _timing_legend(between: list[float]) -> tuple[list[Any], list[str]]:
     from matplotlib.lines import Line2D
 
     entries = {
         "median": Line2D([], [], color=INK, marker="o", linestyle="none"),
         "99 %": Line2D([], [], color=INK, marker="|", markersize=8, markeredgewidth=1.4, linestyle="none"),
         "longest": Line2D([], [], color="white", marker="o", markeredgecolor=INK, linestyle="none"),
-        "20 ms tick": Line2D([], [], color=FAINT, linestyle="--", linewidth=0.8),
+        f"{' and '.join(f'{each:g}' for each in between)} ms tick": Line2D(
+            [], [], color=FAINT, linestyle="--", linewidth=0.8
+        ),
     }
     return list(entries.values()), list(entries)
 

@@ -23,6 +23,7 @@ from .files import write_whole
 from .records import HUNG
 from .run_folder import LOG, open_folder
 from .training_folder import CONFIG, SEED, curve_of, seeds_of, write_curves
+from .training_progress import progress, steps_done
 
 
 def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
@@ -84,24 +85,23 @@ def train(config: TrainConfig, folder: Path, executor: Executor, err: Any) -> No
         BadConfig: what a worker refuses.
         WorkerFailed: workers die, or cannot do their work.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     waiting: deque[Job] = deque()
     done = {seed: len(curve_of(folder, seed)) for seed in seeds_of(config)}
     for seed, legs in done.items():
         if legs < config.legs:
             waiting.append(_job(config, folder, seed, legs + 1))
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=err, transient=True) as bars:
-        total = config.legs * config.seeds
-        bar = bars.add_task("evaluations", total=total, completed=sum(min(n, config.legs) for n in done.values()))
+    err.print(
+        f"{config.name}: {config.algorithm} on {config.task}, {config.seeds} seed{'s' * (config.seeds != 1)}, "
+        f"{config.steps} steps each, evaluated every {config.evaluate_every}: {folder}"
+    )
+    with progress(lambda: steps_done(config, folder, done), config.steps * config.seeds, err):
         for outcome in executor.results(waiting):
             seed, leg = outcome.job["seed"], outcome.job["leg"]
             point = _point(config, outcome)
             success = sum(point["successes"]) / len(point["successes"])
             average = sum(point["returns"]) / len(point["returns"])
             err.print(f"seed {seed}, {point['steps']} steps: {success:.0%} succeed, return {average:.1f}")
-            bars.update(bar, advance=1)
+            done[seed] = leg
             if leg < config.legs:
                 # the same worker takes it: it has this learner in memory
                 waiting.appendleft(_job(config, folder, seed, leg + 1))

@@ -29,6 +29,7 @@ from .learner_state import load_state, save_state
 from .learners import EXTRA, chosen, demo_transitions, made_model
 from .train_env import base_env, features_of, seen_env, shown
 from .training_points import LEG, NUMBERS, Point, last_leg, numbers_of, points_of
+from .training_progress import writing_steps
 
 DEMONSTRATIONS = {"sac-demo": 1, "bc": 1, "residual": 1}
 
@@ -119,7 +120,12 @@ class Trainee:
             warnings.simplefilter("ignore")
             if hasattr(getattr(self.model, "replay_buffer", None), "truncate_last_trajectory"):
                 self.model.replay_buffer.truncate_last_trajectory()
-            self.model.learn(self.config.evaluate_every, reset_num_timesteps=False, log_interval=10)
+            self.model.learn(
+                self.config.evaluate_every,
+                writing_steps(self.folder),
+                reset_num_timesteps=False,
+                log_interval=10,
+            )
 
     @contextmanager
     def _events(self, leg: int) -> Iterator[Any]:

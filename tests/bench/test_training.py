@@ -10,15 +10,19 @@ import subprocess
 import sys
 import time
 from dataclasses import asdict
+from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from onedemo.bench import train as command
 from onedemo.bench.learning_curves import mean_interval, summary_rows
 from onedemo.bench.training_folder import curve_of
 from onedemo.bench.training_points import Point
+from onedemo.bench.training_progress import EVERY, progress, steps_done, writing_steps
 from onedemo.configs.learner_defaults import DEFAULTS
 from onedemo.configs.shipped import FOLDER, shipped_training
 from onedemo.configs.training import ALGORITHMS, TRAIN_KEYS, load_training
@@ -103,6 +107,22 @@ def events(folder, name):
     seen.Reload()
     scalars = seen.Scalars(name)
     return [scalar.step for scalar in scalars], [scalar.value for scalar in scalars]
+
+
+def test_steps_are_told_between_evaluations_too(tmp_path):
+    config = load_training(shipped_training("reach_sac"), ["steps=10000", "evaluate_every=5000", "seeds=3"])
+    assert steps_done(config, tmp_path, {0: 0, 1: 0, 2: 0}) == 0
+    for seed, done in ((0, 1250), (1, 7000)):
+        (tmp_path / f"seed-{seed}").mkdir()
+        callback = writing_steps(tmp_path / f"seed-{seed}")
+        for steps in range(1, done + 1):
+            assert callback({"self": SimpleNamespace(num_timesteps=steps)}, {})
+    # the last seed was trained with more steps before than are wanted now
+    assert steps_done(config, tmp_path, {0: 0, 1: 1, 2: 3}) == pytest.approx(1250 + 7000 + 10_000, abs=2 * EVERY)
+    screen = Console(file=StringIO(), force_terminal=True)
+    with progress(lambda: steps_done(config, tmp_path, {0: 0, 1: 1, 2: 3}), 30_000, screen) as bars:
+        bars.refresh()
+        assert bars.tasks[0].completed > 17_000
 
 
 def test_an_actor_acts_in_a_comparison_as_it_was_evaluated(tmp_path):
