@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from ..configs.cell import RunConfig
+from ..envs import IDS
 from .figure_style import FAINT, INK, legend_above, new_figure
 from .groups import SAFE, UNSAFE, rank
 from .methods import look_of
@@ -95,7 +96,7 @@ def timing(lines: list[Series]) -> Any | None:
         axes.plot(middle, row, "o", color=color, label="median" if row == 0 else None)
         axes.plot(late, row, "|", color=color, markersize=8, markeredgewidth=1.4)
         axes.plot(most, row, "o", color="white", markeredgecolor=color, markeredgewidth=0.9)
-    between = sorted({_between(group.cell) for line, _ in known for group in line.groups})
+    between = timing_ticks([line for line, _ in known])
     for milliseconds in between:
         axes.axvline(milliseconds, color=FAINT, linewidth=0.8, linestyle="--", zorder=0)
     axes.set(xscale="log", ylim=(len(known) - 0.4, -0.6), xlabel="time per tick [ms]")
@@ -107,9 +108,11 @@ def timing(lines: list[Series]) -> Any | None:
     return figure
 
 
-def _between(cell: RunConfig) -> float:
-    """Time between two ticks [ms]."""
-    return 1e3 / int(cell.env.get("control_frequency", TASKS[cell.task].frequency))
+def timing_ticks(lines: Iterable[Series]) -> list[float]:
+    """Times between two ticks in these episodes [ms], each once."""
+    cells = [group.cell for line in lines for group in line.groups]
+    rates = {int(cell.env.get("control_frequency", IDS[TASKS[cell.task].id].frequency)) for cell in cells}
+    return sorted(1e3 / rate for rate in rates)
 
 
 def _timing_legend(between: list[float]) -> tuple[list[Any], list[str]]:

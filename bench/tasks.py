@@ -36,7 +36,6 @@ class TaskFacts:
         poured_into: index of the glass that is poured into; None: nothing is poured.
         upright: what is carried should be kept level.
         shown: the task that its demonstration shows, where that is another one; "" for itself.
-        frequency: of its actions, if a config says nothing else [Hz].
     """
 
     id: str
@@ -46,7 +45,6 @@ class TaskFacts:
     poured_into: int | None = None
     upright: bool = True
     shown: str = ""
-    frequency: int = 50
 
 
 OUTSIDE = Error("fraction_outside", "largest share of beads outside", "%", 1e2)
@@ -64,18 +62,15 @@ TASKS = {
         "insert",
         upright=False,
     ),
-    "reach": TaskFacts(
-        "onedemo/Reach-v0", OFFSET, {"reach_offset": "position_error"}, upright=False, shown="stack", frequency=20
-    ),
+    "reach": TaskFacts("onedemo/Reach-v0", OFFSET, {"reach_offset": "position_error"}, upright=False, shown="stack"),
     "place_one": TaskFacts(
         "onedemo/PlaceOne-v0",
         OFFSET,
         {"stack_offset": "position_error", "stack_yaw": "yaw_error"},
         "transfer",
         shown="stack",
-        frequency=20,
     ),
-    "tilt_pour": TaskFacts("onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, shown="pour", frequency=20),
+    "tilt_pour": TaskFacts("onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, shown="pour"),
     "insert_one": TaskFacts(
         "onedemo/InsertOne-v0",
         OFFSET,
@@ -83,7 +78,6 @@ TASKS = {
         "insert",
         upright=False,
         shown="shelve",
-        frequency=20,
     ),
     "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, shown="pour"),
 }

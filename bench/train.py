@@ -116,7 +116,7 @@ def _point(config: TrainConfig, outcome: Any) -> dict[str, Any]:
     if "crash" in answer:
         raise WorkerFailed(f"{config.name}: {answer['crash']}; see {LOG}")
     if "refused" in answer:
-        raise BadConfig(config.name, answer["key"], answer["refused"])
+        raise BadConfig(config.name, answer["key"], answer["refused"].removeprefix(f"{config.name}: "))
     return answer["point"]
 
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from inspect import signature
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.envs.registration import load_env_creator
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.bench.carries import carries, carrying_tilt, tilts
@@ -309,9 +307,3 @@ def test_the_documentation_explains_every_metric():
     text = (Path(__file__).parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
     for metric in METRICS.values():
         assert f"| {metric.title} | {metric.meaning} | {metric.better or '–'} |" in text
-
-
-@pytest.mark.parametrize("task", sorted(TASKS))
-def test_tasks_are_known_to_act_as_often_as_they_do(task):
-    make = load_env_creator(gym.spec(TASKS[task].id).entry_point)
-    assert TASKS[task].frequency == signature(make).parameters["control_frequency"].default

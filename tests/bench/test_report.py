@@ -8,6 +8,7 @@ import re
 import threading
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 import numpy as np
@@ -19,6 +20,8 @@ from onedemo.bench.escaping import csv_text, markdown_text, plain, slug
 from onedemo.bench.files import sha256_of
 from onedemo.bench.groups import groups_of, metric_tests, rank, success_tests
 from onedemo.bench.methods import LOOKS, look_of
+from onedemo.bench.outcome_figures import timing_ticks
+from onedemo.bench.rate_figures import Series
 from onedemo.bench.records import ERROR, FILE, HUNG, WORKER_DIED, encoded, read_records
 from onedemo.bench.report import write_report, write_report_of
 from onedemo.bench.report_tables import number, p_words
@@ -27,6 +30,7 @@ from onedemo.bench.run_reading import merged, peak_speed, read_run, speeds_of
 from onedemo.bench.scenarios import Suite, frozen, read_suite
 from onedemo.bench.statistics import holm, mcnemar
 from onedemo.bench.videos import Video, chosen, video_of, videos_in
+from onedemo.configs.cell import RunConfig
 from onedemo.planner.errors import BadConfig
 
 HOSTILE = [
@@ -379,6 +383,15 @@ def test_a_method_looks_the_same_in_every_report():
     assert len(set(looks)) == len(looks)
     assert look_of("screw") == LOOKS["screw"]
     assert look_of("mine") == look_of("mine")
+
+
+@pytest.mark.parametrize(
+    "task, env, milliseconds", [("stack", {}, 20), ("reach", {}, 50), ("stack", {"control_frequency": 25}, 40)]
+)
+def test_a_tick_is_as_long_as_the_task_has_it(task, env, milliseconds):
+    cell = RunConfig(name="x", task=task, method="screw", demonstration="stack", env=env)
+    (drawn,) = timing_ticks([Series("screw", "screw", [SimpleNamespace(cell=cell)])])
+    assert drawn == pytest.approx(milliseconds)
 
 
 def test_speeds_are_those_of_the_drawn_obstacles(tmp_path):
