@@ -6,6 +6,7 @@
 | `environment.json` | on what it was run, and the command |
 | `seed-0/leg-00010/` | of each seed the last whole leg: the curve so far, weights, replay buffer, actor |
 | `seed-0/tensorboard/` | losses, returns and evaluations for TensorBoard |
+| `seed-0/steps` | how far it is, renewed between evaluations |
 | `curve.csv` | every evaluation of every seed |
 | `curve.png`, `curve.pdf` | success against steps, every seed drawn |
 | `actor.json`, `actor.safetensors` | the last actor of the best seed |
