@@ -57,7 +57,6 @@ def read_training(folder: Path) -> Training:
 def by_label(trainings: Sequence[Training]) -> dict[str, Training]:
     """By algorithm, in the order of tables; where there are several of one, by what differs, too."""
     trainings = sorted(trainings, key=lambda each: place_of(each.config.algorithm))
-    several = Counter(each.config.algorithm for each in trainings)
     labels = []
     for each in trainings:
         same = [flat(other.config) for other in trainings if other.config.algorithm == each.config.algorithm]
@@ -67,7 +66,7 @@ def by_label(trainings: Sequence[Training]) -> dict[str, Training]:
         labels.append(", ".join([each.config.algorithm, *words]))
     twice = Counter(labels)
     return {
-        label if twice[label] == 1 or several[each.config.algorithm] == 1 else f"{label} ({each.folder})": each
+        label if twice[label] == 1 else f"{label} ({each.folder})": each
         for label, each in zip(labels, trainings, strict=True)
     }
 
