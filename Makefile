@@ -6,9 +6,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
-FOLDERS := envs planner baselines configs bench tests
-LEARNING := $(addprefix tests/,bench/test_training.py bench/test_hindsight.py baselines/test_export.py baselines/test_learned.py \
-    baselines/test_learning_page.py)
+FOLDERS := face envs planner baselines configs bench tests
+LEARNING := $(addprefix tests/,bench/train/test_command.py bench/train/test_hindsight.py \
+    baselines/learning/test_export_actor.py baselines/learning/test_learned_policy.py baselines/learning/test_learning_page.py)
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test learn slow lint types check perf soak study docs bodies beads clean
@@ -71,10 +71,10 @@ docs: $(VENV)/.developed ## the page and the clip of every task: docs/tasks
 	@$(BIN)/onedemo tasks --write docs/tasks --clips
 
 bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
-	@$(BIN)/python -c "from onedemo.envs import bodies, scene; bodies.TABLE.write_text(bodies.table_text(tuple(scene.ROBOTS)))"
+	@$(BIN)/python -c "from onedemo.envs.scene import robot_bodies as b, scene; b.TABLE.write_text(b.table_text(tuple(scene.ROBOTS)))"
 
 beads: $(VENV)/.developed ## let the beads settle in their glasses anew (for a new glass)
-	@$(BIN)/python -c "from onedemo.envs import beads, pour_geometry as g, pour_places as p; beads.TABLE.write_text(beads.table_text(((p.WIDE, g.BEADS), (p.SLIM, g.BEADS))))"
+	@$(BIN)/python -c "from onedemo.envs.pour import geometry as g, places as p; from onedemo.envs.scene import beads; beads.TABLE.write_text(beads.table_text(((p.WIDE, g.BEADS), (p.SLIM, g.BEADS))))"
 
 clean: ## remove the environment, the caches and the builds; runs/ stays
 	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

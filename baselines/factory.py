@@ -9,21 +9,28 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from ..envs.task import TaskDescription
-from ..planner.demo import Demonstration
+from ..envs.core.description import TaskDescription
 from ..planner.errors import BadConfig, OneDemoError, UnknownName
-from ..planner.pose import Pose
-from ..planner.tsia import screw_path
-from .learned import METHODS, LearnedPolicy, LearnedSettings
-from .makers import straight_path
-from .opponents import DecoupledSettings, DmpGoalSettings, DmpWorldSettings, PotentialSettings, ReplaySettings
+from ..planner.geometry.pose import Pose
+from ..planner.imitation.demonstration import Demonstration
+from ..planner.imitation.tsia import screw_path
+from .key_poses import Join, sparse
+from .learning.actor_card import METHOD
+from .learning.learned_policy import METHODS, LearnedPolicy, LearnedSettings
+from .learning.residual_policy import ResidualPolicy
+from .motion.baseline_motions import (
+    DecoupledSettings,
+    DmpGoalSettings,
+    DmpWorldSettings,
+    PotentialSettings,
+    ReplaySettings,
+)
+from .motion.path_generators import straight_path
+from .motion.rrt_motion import SamplingPolicySettings
 from .own_policy import is_own, own_policy
 from .policy import Policy
 from .program_policy import ProgramPolicy
-from .residual import METHOD, ResidualPolicy
-from .sampling_mover import SamplingPolicySettings
 from .screw_policy import ScrewPolicy, ScrewSettings
-from .sparse import Join, sparse
 
 Settings = TypeVar("Settings")
 OWN_TOOL = "moves the hand itself: only the legs of shipped policies can be moved in another frame of the hand"

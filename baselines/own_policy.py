@@ -8,9 +8,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
-from ..envs.task import TaskDescription
-from ..planner.demo import Demonstration
+from ..envs.core.description import TaskDescription
 from ..planner.errors import BadConfig, OneDemoError
+from ..planner.imitation.demonstration import Demonstration
 from .policy import Policy
 
 FORM = "my_package.my_module:MyPolicy"

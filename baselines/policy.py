@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..planner.pose import PosePath
+from ..planner.geometry.pose import PosePath
 
 Observation = Mapping[str, np.ndarray]
 
@@ -35,7 +35,7 @@ class PolicyReport:
 
     Attributes:
         done: the policy has nothing more to do.
-        failure_reason: "" or one of `onedemo.envs.task.FAILURES`: why it gave up.
+        failure_reason: "" or one of `onedemo.envs.core.description.FAILURES`: why it gave up.
         detail: one line for the reader.
         paths: the paths it used so far.
     """

@@ -7,22 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..envs.task import TaskDescription
-from ..planner.demo import Demonstration
+from ..envs.core.description import TaskDescription
 from ..planner.errors import BadOption, PlanFailed, UnknownName
-from ..planner.motions import MotionSettings
-from ..planner.pose import Pose
-from .bimanual_program import BimanualPourProgram
-from .hand import Hand
+from ..planner.geometry.pose import Pose
+from ..planner.imitation.demonstration import Demonstration
+from ..planner.planning.settings import MotionSettings
+from .motion.settings import ProgramSettings
+from .motion.tool_frame import ToolMover
 from .policy import EpisodePolicy, Observation, PolicyReport
-from .pour_program import PourProgram
-from .program_settings import ProgramSettings
-from .reach_program import ReachProgram
-from .shelve_program import ShelveProgram
-from .stack_program import StackProgram
-from .surroundings import Surroundings
-from .tool_frame import ToolMover
-from .two_hands import TwoHands
+from .programs.arm_executor import Hand
+from .programs.bimanual_pour import BimanualPourProgram
+from .programs.dual_arm_executor import TwoHands
+from .programs.pour import PourProgram
+from .programs.reach import ReachProgram
+from .programs.shelve import ShelveProgram
+from .programs.stack import StackProgram
+from .programs.world_model import Surroundings
 
 Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram
 PROGRAMS = {

@@ -7,12 +7,12 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from ..planner.collision.robot_arrays import PREVIOUS
+from ..planner.collision.self_collision import pairs_of
 from ..planner.errors import BadOption
-from ..planner.robot_work import PREVIOUS
-from ..planner.safety import SafetyLayer, SafetySettings
+from ..planner.safety.safety_layer import SafetyLayer, SafetySettings
 from .policy import Observation
-from .surroundings import Surroundings
-from .two_hands import pairs_of
+from .programs.world_model import Surroundings
 
 MARGIN = 0.005
 """Distance [m] to keep from the table and from objects: more than the arm lags, less than a grasp needs."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..envs.task import TaskDescription
-from ..planner.demo import Demonstration
-from ..planner.plans import PlanSettings
-from ..planner.pose import Pose
-from ..planner.repet import RepetSettings
-from .mover import SCREW, Mover
+from ..envs.core.description import TaskDescription
+from ..planner.escape.repet import RepetSettings
+from ..planner.geometry.pose import Pose
+from ..planner.imitation.demonstration import Demonstration
+from ..planner.planning.settings import PlanSettings
+from .motion.motion_method import SCREW, Mover
+from .motion.settings import ProgramSettings
 from .program_policy import PROGRAMS, ProgramPolicy
-from .program_settings import ProgramSettings
 
 __all__ = ["PROGRAMS", "ScrewPolicy", "ScrewSettings"]
 

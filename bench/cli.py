@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from . import demo_commands
+from . import demonstrations as demo_commands
 from .console import console, labeled, missing_library
-from .ending import INTERRUPTED
+from .interruption import INTERRUPTED
 
 BAD_INPUT = 2
 USAGE: Any = typer.BadParameter.__base__
@@ -54,7 +54,7 @@ def run(
 
     - onedemo run headline --shard 2/16
     """
-    from .run import run_config
+    from .run.command import run_config
 
     raise typer.Exit(run_config(config, overrides or [], output, shard=shard, retry=retry, quiet=quiet))
 
@@ -79,7 +79,7 @@ def train(
 
     - onedemo train place_demo steps=400000 learner.batch_size=512
     """
-    from .train import run_training
+    from .train.command import run_training
 
     raise typer.Exit(run_training(config, overrides or [], output, quiet=quiet))
 
@@ -99,7 +99,7 @@ def curves(
 
     Example: onedemo curves trainings/reach-sac-* trainings/reach-ppo-* --run runs/reach-0123456789ab
     """
-    from .curves_command import run_curves
+    from .curves.command import run_curves
 
     run_curves(trainings, run, output)
 
@@ -121,7 +121,7 @@ def report(
 
     - onedemo report runs/mine runs/theirs --output comparison
     """
-    from .report_command import run_report
+    from .report.command import run_report
 
     run_report(runs, output)
 
@@ -145,7 +145,7 @@ def plan(
 
     Example: onedemo plan wall_gap --figure gap.png
     """
-    from .plan_command import run_plan
+    from .plan.command import run_plan
 
     raise typer.Exit(run_plan(scene, overrides or [], figure, output, judged=certify, smooth=smooth, timed=timed))
 
@@ -170,7 +170,7 @@ def reproduce(
 
     - onedemo reproduce stack tree --no-video
     """
-    from .reproduce import reproduce
+    from .reproduce.command import reproduce
 
     raise typer.Exit(reproduce(names or [], output, episodes=episodes, video=video))
 
@@ -197,7 +197,7 @@ def geometric(
 
     - onedemo geometric --scenarios 200 --seed 7 -o runs/seven --method screw --method rrt
     """
-    from .geometric_run import run_geometric
+    from .geometric.command import run_geometric
 
     raise typer.Exit(run_geometric(scenarios, seed, output, methods=method or [], workers=workers, quiet=quiet))
 
@@ -214,7 +214,7 @@ def perf(
 
     Example: onedemo perf --only controller --json perf.json
     """
-    from .perf import run_perf
+    from .perf.command import run_perf
 
     raise typer.Exit(run_perf(only, json))
 
@@ -250,7 +250,7 @@ def schema() -> None:
     """
     import json
 
-    from ..configs.cell import json_schema
+    from ..configs.run_config import json_schema
 
     console().print(json.dumps(json_schema(), indent=2))
 

@@ -157,3 +157,22 @@ def hierarchical_bootstrap(
         draws.append(statistic(np.concatenate([a[rng.integers(len(a), size=len(a))] for a in chosen])))
     low, high = np.quantile(draws, [0.025, 0.975])
     return statistic(np.concatenate(arrays)), float(low), float(high)
+
+
+class Rate(NamedTuple):
+    """A share of episodes with its 95 % interval."""
+
+    count: int
+    episodes: int
+    low: float
+    high: float
+
+    @staticmethod
+    def of(count: int, episodes: int) -> Rate:
+        """With Wilson's interval."""
+        return Rate(count, episodes, *wilson(count, episodes))
+
+    @property
+    def share(self) -> float:
+        """The rate; NaN without episodes."""
+        return self.count / self.episodes if self.episodes else float("nan")

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..envs import IDS
 from .console import console, writing
-from .tasks import TASKS
+from .task_table import TASKS
 
 CLIP_SIZE = (480, 360)
 CLIP_SECONDS = 8.0
@@ -75,11 +75,11 @@ def write_pages(folder: Path, *, clips: bool) -> list[Path]:
 
 def write_clip(task: str, file: Path) -> Path:
     """A looping clip of the planner's first episode of a task's shipped config."""
-    from ..configs.schema import load_config
-    from ..configs.shipped import shipped_config
-    from .episode import run_episode
-    from .scenarios import scenarios_of
-    from .workshop import made, policy_for
+    from ..configs.grid import load_config
+    from ..configs.shipped_files import shipped_config
+    from .episodes.episode import run_episode
+    from .episodes.scenarios import scenarios_of
+    from .run.episode_jobs import made, policy_for
 
     config = load_config(shipped_config(task))
     env = made(config, "rgb_array")

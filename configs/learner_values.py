@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from .cell import reason_of
+from .run_config import reason_of
 
 Count = Annotated[int, Field(ge=1, strict=True)]
 Above = Annotated[float, Field(gt=0)]

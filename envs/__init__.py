@@ -1,7 +1,7 @@
 """Gymnasium tasks on simulated robots; importing this registers the ids `onedemo/…`."""
 
+from .core.description import FAILURES, TaskDescription, TaskObject
 from .registration import IDS, register_all
-from .task import FAILURES, TaskDescription, TaskObject
 
 __all__ = ["FAILURES", "IDS", "TaskDescription", "TaskObject", "register_all"]
 

@@ -27,14 +27,14 @@ class Id(NamedTuple):
 
 
 IDS = {
-    "onedemo/Stack-v0": Id("onedemo.envs.stacking:StackEnv", 60.0),
-    "onedemo/Shelve-v0": Id("onedemo.envs.shelving:ShelveEnv", 90.0),
-    "onedemo/Pour-v0": Id("onedemo.envs.pouring:PourEnv", 40.0),
-    "onedemo/BimanualPour-v0": Id("onedemo.envs.bimanual_pouring:BimanualPourEnv", 40.0),
-    "onedemo/Reach-v0": Id("onedemo.envs.reaching:ReachEnv", 7.5, 20),
-    "onedemo/PlaceOne-v0": Id("onedemo.envs.placing:PlaceOneEnv", 7.5, 20),
-    "onedemo/TiltPour-v0": Id("onedemo.envs.tilting:TiltPourEnv", 7.5, 20),
-    "onedemo/InsertOne-v0": Id("onedemo.envs.inserting:InsertOneEnv", 7.5, 20),
+    "onedemo/Stack-v0": Id("onedemo.envs.stack.stack_env:StackEnv", 60.0),
+    "onedemo/Shelve-v0": Id("onedemo.envs.shelve.shelve_env:ShelveEnv", 90.0),
+    "onedemo/Pour-v0": Id("onedemo.envs.pour.pour_env:PourEnv", 40.0),
+    "onedemo/BimanualPour-v0": Id("onedemo.envs.pour.bimanual_pour_env:BimanualPourEnv", 40.0),
+    "onedemo/Reach-v0": Id("onedemo.envs.stack.reach_env:ReachEnv", 7.5, 20),
+    "onedemo/PlaceOne-v0": Id("onedemo.envs.stack.place_one_env:PlaceOneEnv", 7.5, 20),
+    "onedemo/TiltPour-v0": Id("onedemo.envs.pour.tilt_pour_env:TiltPourEnv", 7.5, 20),
+    "onedemo/InsertOne-v0": Id("onedemo.envs.shelve.insert_one_env:InsertOneEnv", 7.5, 20),
 }
 """The last four are single motions of the others, for those who train."""
 

@@ -8,9 +8,9 @@ folder is compiled once per user instead of once per process.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
-import re
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -25,18 +25,30 @@ config: Any = import_module("numba.core.config")
 config.LOOP_VECTORIZE = config.SLP_VECTORIZE = 0
 
 
-IMPORT = re.compile(r"^\s*from (\.+)([a-z_.]*) import \(?([a-z_, ]*)", re.MULTILINE)
-"""A relative import: dots, module, and the names behind it, which may be modules."""
+@cache
+def _imported(source: Path) -> frozenset[Path]:
+    """Project files that a file imports, wherever the import stands."""
+    nodes = _relative_imports(source)
+    return frozenset(file for node in nodes for alias in node.names for file in _files_of(source, node, alias.name))
 
 
-def _imported(source: Path) -> Iterator[Path]:
-    """Project files that a file imports."""
-    for dots, module, names in IMPORT.findall(source.read_text(encoding="utf-8")):
-        folder = source.parents[len(dots) - 1].joinpath(*module.split(".") if module else ())
-        for name in ("", *(name.strip() for name in names.split(","))):
-            file = (folder / name).with_suffix(".py")
-            if file.is_file():
-                yield file
+def _relative_imports(source: Path) -> list[ast.ImportFrom]:
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level]
+
+
+def _files_of(source: Path, node: ast.ImportFrom, name: str) -> Iterator[Path]:
+    """The file of a module, or of the module in a package that a name is or comes from."""
+    base = source.parents[node.level - 1].joinpath(*node.module.split(".") if node.module else ())
+    package = base / "__init__.py"
+    for file in (base.with_suffix(".py"), base / f"{name}.py"):
+        if file.is_file():
+            yield file
+            return
+    if package.is_file():  # a public face: only what it takes the name from
+        for inner_node in _relative_imports(package):
+            if name in [alias.name for alias in inner_node.names]:
+                yield from _files_of(package, inner_node, name)
 
 
 @cache

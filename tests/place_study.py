@@ -12,18 +12,18 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from reach import TURNS, PourReach, ShelfReach, up
+from helpers.reach import TURNS, PourReach, ShelfReach, up
 
-from onedemo.envs.pour_geometry import grasp
-from onedemo.envs.pour_layouts import fits
-from onedemo.envs.pour_places import SLIM, WIDE, PourPlaces
-from onedemo.envs.robots import ROBOTS
-from onedemo.envs.shelf_layouts import RANGES as SHELF_RANGES
-from onedemo.envs.shelf_layouts import ShelfLayout, shelf_layout
-from onedemo.envs.shelf_parts import DEPTH, SIDE, WIDTH
-from onedemo.envs.shelf_places import ShelfPlaces
-from onedemo.planner.pose import Pose, PosePath
-from onedemo.planner.shapes import Obstacle
+from onedemo.envs.pour.geometry import grasp
+from onedemo.envs.pour.layout import fits
+from onedemo.envs.pour.places import SLIM, WIDE, PourPlaces
+from onedemo.envs.scene.robots import ROBOTS
+from onedemo.envs.shelve.layout import RANGES as SHELF_RANGES
+from onedemo.envs.shelve.layout import ShelfLayout, shelf_layout
+from onedemo.envs.shelve.parts import DEPTH, SIDE, WIDTH
+from onedemo.envs.shelve.places import ShelfPlaces
+from onedemo.planner.geometry.pose import Pose, PosePath
+from onedemo.planner.geometry.shapes import Obstacle
 
 ROOM = 0.03
 """Least room [m] of the arm at the start."""

@@ -14,9 +14,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
-from random_scenes import tool_problem
+from helpers.random_scenes import tool_problem
 
-from onedemo.planner.repet import RepetSettings, escape_path
+from onedemo.planner.escape.repet import RepetSettings, escape_path
 
 KINDS = ("convex", "clutter", "gap", "trap", "shelf")
 DEFAULT = RepetSettings()

@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from random_scenes import KINDS, feasible, judged, problem, solve
+from helpers.random_scenes import KINDS, feasible, judged, problem, solve
 
 
 def study(kind: str, seeds: range, *, unlimited: bool = True) -> dict:

@@ -23,20 +23,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from arms import panda, panda_urdf, random_arm
-from solids import KINDS, fcl_capsule, fcl_distance, fcl_obstacle, random_pose, random_shape
+from helpers.arms import panda, panda_urdf, random_arm
+from helpers.solids import KINDS, fcl_capsule, fcl_distance, fcl_obstacle, random_pose, random_shape
 
-from onedemo.planner import jit, safety
-from onedemo.planner.arm import Arm
-from onedemo.planner.barrier import allowed_speeds, constrain, scale_to_speeds
-from onedemo.planner.body import Body
-from onedemo.planner.body_models import body_from_urdf, resting_pairs
-from onedemo.planner.clearance import find_near, room_at
-from onedemo.planner.pose import Pose
-from onedemo.planner.robot_work import HIGH, LOW, SETTINGS, SPEED, WORLD, place_capsules
-from onedemo.planner.safety import HELD, SafetyLayer, SafetySettings, safe_velocity
-from onedemo.planner.shapes import Box, Obstacle
-from onedemo.planner.tangent import random_number
+from onedemo.planner import jit
+from onedemo.planner.collision.clearance import find_near, room_at
+from onedemo.planner.collision.robot_arrays import HIGH, LOW, SETTINGS, SPEED, WORLD, place_capsules
+from onedemo.planner.escape.tangent_plane import random_number
+from onedemo.planner.geometry.pose import Pose
+from onedemo.planner.geometry.shapes import Box, Obstacle
+from onedemo.planner.robot.arm import Arm
+from onedemo.planner.robot.body import Body
+from onedemo.planner.robot.body_readers import body_from_urdf, resting_pairs
+from onedemo.planner.safety import safety_layer as safety
+from onedemo.planner.safety.barrier import allowed_speeds, constrain, scale_to_speeds
+from onedemo.planner.safety.safety_layer import HELD, SafetyLayer, SafetySettings, safe_velocity
 
 BANG, RANDOM, STEEPEST, TOWARDS, CORNER, ABSURD, GRAZE = range(7)
 MODES = (BANG, RANDOM, CORNER, ABSURD, STEEPEST, TOWARDS, GRAZE, STEEPEST, TOWARDS, GRAZE)
@@ -313,7 +314,7 @@ def fcl_rooms(scene: Scene, log: np.ndarray, substeps: int) -> float:
 def sources_digest(*folders: Path) -> str:
     """sha256 of all sources in some folders."""
     digest = hashlib.sha256()
-    for file in sorted(file for folder in folders for file in folder.glob("*.py")):
+    for file in sorted(file for folder in folders for file in folder.glob("**/*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
 
@@ -404,7 +405,7 @@ def soak_guard(steps: int, seed: int, chunk: int, output: Path) -> bool:
 
 def soak_runs(kills: int, seed: int, output: Path) -> bool:
     """Kill runs so many times; whether nothing was lost."""
-    import killed_runs
+    from helpers import killed_runs
 
     with tempfile.TemporaryDirectory() as folder:
         found = killed_runs.killed_runs(Path(folder), kills, seed)

@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from helpers.import_graph import PACKAGES
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -20,22 +21,25 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
 def test_every_folder_of_code_is_a_listed_package():
-    folders = {path.parent.name for path in ROOT.glob("*/__init__.py")}
-    listed = set(PROJECT["tool"]["setuptools"]["packages"])
-    assert listed == {f"onedemo.{folder}" for folder in folders}
-    assert PROJECT["tool"]["setuptools"]["package-dir"] == {f"onedemo.{folder}": folder for folder in folders}
+    folders = {
+        path.parent.relative_to(ROOT) for package in PACKAGES for path in (ROOT / package).glob("**/__init__.py")
+    }
+    names = {".".join(("onedemo", *folder.parts)) for folder in folders if folder.parts != ("face",)}
+    assert set(PROJECT["tool"]["setuptools"]["packages"]) == {"onedemo", *names}
+    mapped = {f"onedemo.{package}": package for package in PACKAGES if package != "face"}
+    assert PROJECT["tool"]["setuptools"]["package-dir"] == {"onedemo": "face", **mapped}
     assert not (ROOT / "__init__.py").exists()
     assert not list((ROOT / "tests").glob("**/__init__.py"))
 
 
 def test_every_package_says_that_it_is_typed():
-    for path in ROOT.glob("*/__init__.py"):
-        assert (path.parent / "py.typed").exists(), path.parent.name
+    for package in PACKAGES:
+        assert (ROOT / package / "py.typed").exists(), package
 
 
 def test_the_wheel_holds_code_configs_demonstrations_and_licences(tmp_path):
     source = tmp_path / "source"  # a build leaves files behind that would end up in later wheels
-    for item in ("pyproject.toml", "README.md", "LICENSE", "planner", "envs", "baselines", "configs", "bench"):
+    for item in ("pyproject.toml", "README.md", "LICENSE", *PACKAGES):
         copy = shutil.copytree if (ROOT / item).is_dir() else shutil.copy
         source.mkdir(exist_ok=True)
         copy(ROOT / item, source / item)
@@ -47,8 +51,8 @@ def test_the_wheel_holds_code_configs_demonstrations_and_licences(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
     sources = {
-        f"onedemo/{path.relative_to(ROOT)}"
-        for folder in ("planner", "envs", "baselines", "configs", "bench")
+        f"onedemo/{path.relative_to(ROOT)}".replace("onedemo/face/", "onedemo/")
+        for folder in PACKAGES
         for path in (ROOT / folder).glob("**/*")
         if path.suffix in (".py", ".yaml", ".npz", ".safetensors", ".typed") or path.name.startswith("LICENSE")
     }

@@ -18,13 +18,13 @@ import numpy as np
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
-from onedemo.configs.loader import load_mapping
-from onedemo.configs.shipped import shipped_demonstration
-from onedemo.planner.demo_io import load_demonstration
+from onedemo.configs.shipped_files import shipped_demonstration
+from onedemo.configs.strict_yaml import load_mapping
 from onedemo.planner.errors import PlanFailed
-from onedemo.planner.plans import Plan
-from onedemo.planner.safety import SafetySettings
-from onedemo.planner.scene_work import Layout, SceneWork
+from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.planning.plan import Plan
+from onedemo.planner.planning.planning_scene import Layout, SceneWork
+from onedemo.planner.safety.safety_layer import SafetySettings
 
 RESERVED = range(0, 1000)
 """Seeds of results that are reported."""

@@ -5,19 +5,19 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 import pytest
-from actors import saved_actor
-from policies import LEARNED, PROGRAMS, installed
+from helpers.actors import saved_actor
+from helpers.policies import LEARNED, PROGRAMS, installed
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import POLICIES, make_policy
 from onedemo.baselines.policy import PolicyReport
-from onedemo.bench.episode import run_episode
-from onedemo.bench.scenarios import Scenario
-from onedemo.configs.schema import load_config
-from onedemo.configs.shipped import shipped_config, shipped_demonstration
-from onedemo.envs.task import FAILURES
-from onedemo.planner.demo_io import load_demonstration
+from onedemo.bench.episodes.episode import run_episode
+from onedemo.bench.episodes.scenarios import Scenario
+from onedemo.configs.grid import load_config
+from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
+from onedemo.envs.core.description import FAILURES
 from onedemo.planner.errors import BadConfig, BadOption, UnknownName
+from onedemo.planner.imitation.demonstration_files import load_demonstration
 
 each_policy = pytest.mark.parametrize("name", installed(*sorted(POLICIES)))
 each_program = pytest.mark.parametrize("name", installed(*PROGRAMS, "residual"))

@@ -5,21 +5,21 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 import pytest
-from actors import saved_actor
-from policies import LEARNED, PROGRAMS, installed
+from helpers.actors import saved_actor
+from helpers.policies import LEARNED, PROGRAMS, installed
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
-from onedemo.baselines.sparse import DENSE
-from onedemo.baselines.tool_frame import ToolMover
-from onedemo.bench.geometric_metrics import curve_gap
-from onedemo.bench.tasks import TASKS
-from onedemo.bench.workshop import policy_for
-from onedemo.configs.cell import RunConfig
-from onedemo.configs.schema import load_config
-from onedemo.configs.shipped import shipped_config, shipped_demonstration
-from onedemo.planner.demo_io import load_demonstration
-from onedemo.planner.segment import key_poses, resampled
+from onedemo.baselines.key_poses import DENSE
+from onedemo.baselines.motion.tool_frame import ToolMover
+from onedemo.bench.geometric.metrics import curve_gap
+from onedemo.bench.run.episode_jobs import policy_for
+from onedemo.bench.task_table import TASKS
+from onedemo.configs.grid import load_config
+from onedemo.configs.run_config import RunConfig
+from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
+from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.segmentation import key_poses, resampled
 
 TICKS = 100
 

@@ -12,9 +12,9 @@ import pytest
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.bench.cli import main
-from onedemo.configs.shipped import shipped_demonstration
-from onedemo.planner.demo_io import load_demonstration
+from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.errors import BadConfig, BadOption
+from onedemo.planner.imitation.demonstration_files import load_demonstration
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_policy.md"
 BROKEN = """

@@ -7,13 +7,13 @@ import pytest
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
-from onedemo.bench.episode import run_episode
-from onedemo.bench.scenarios import Scenario
-from onedemo.bench.workshop import made, policy_for
-from onedemo.configs.schema import load_config
-from onedemo.configs.shipped import shipped_config, shipped_demonstration
-from onedemo.planner.demo_io import load_demonstration
+from onedemo.bench.episodes.episode import run_episode
+from onedemo.bench.episodes.scenarios import Scenario
+from onedemo.bench.run.episode_jobs import made, policy_for
+from onedemo.configs.grid import load_config
+from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.planner.errors import BadOption
+from onedemo.planner.imitation.demonstration_files import load_demonstration
 
 each_task = pytest.mark.parametrize("task", ["reach", "place_one", "tilt_pour", "insert_one"])
 

@@ -6,11 +6,11 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from policies import PROGRAMS, installed
+from helpers.policies import PROGRAMS, installed
 from tune_opponents import RESERVED, nested
 
 from onedemo.baselines.factory import settings_of
-from onedemo.configs.loader import load_mapping
+from onedemo.configs.strict_yaml import load_mapping
 
 FOLDER = Path(__file__).parents[2] / "configs" / "tuning"
 OPPONENTS = [name for name in PROGRAMS if name != "tsia" and not name.startswith("screw")]

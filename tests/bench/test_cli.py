@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from onedemo.bench import perf
 from onedemo.bench.cli import main
-from onedemo.bench.perf_tasks import step_line
-from onedemo.bench.records import read_records
-from onedemo.bench.tasks import TASKS
-from onedemo.configs.shipped import shipped_demonstration
-from onedemo.planner.demo_io import load_demonstration, save_demonstration
+from onedemo.bench.episodes.episode_records import read_records
+from onedemo.bench.perf import command as perf
+from onedemo.bench.perf.tasks import step_line
+from onedemo.bench.task_table import TASKS
+from onedemo.configs.shipped_files import shipped_demonstration
+from onedemo.planner.imitation.demonstration_files import load_demonstration, save_demonstration
 
 ENTRY = "import sys; from onedemo.bench.cli import main; main()"
 
@@ -184,7 +184,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
     def missing(*_):
         raise ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
 
-    monkeypatch.setattr("onedemo.envs.sim.compiled_scene", missing)
+    monkeypatch.setattr("onedemo.envs.simulation.simulation.compiled_scene", missing)
     monkeypatch.chdir(tmp_path)
     code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1", "executor=serial")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
@@ -194,7 +194,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
     def broken(*_):
         raise ImportError("cannot import name 'x'")
 
-    monkeypatch.setattr("onedemo.envs.sim.compiled_scene", broken)
+    monkeypatch.setattr("onedemo.envs.simulation.simulation.compiled_scene", broken)
     monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1", "executor=serial"])
     with pytest.raises(ImportError, match="cannot import name"):
         main()

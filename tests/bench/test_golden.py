@@ -7,12 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from example_records import RECORD
+from helpers.example_records import RECORD
 
-from onedemo.bench import records as record_lines
-from onedemo.bench.records import decoded, encoded, known_record, read_records
-from onedemo.bench.run_folder import read_cells, recorded
-from onedemo.bench.scenarios import read_suite
+from onedemo.bench.episodes import episode_records as record_lines
+from onedemo.bench.episodes.episode_records import decoded, encoded, known_record, read_records
+from onedemo.bench.episodes.run_folder import read_cells, recorded
+from onedemo.bench.episodes.scenarios import read_suite
 
 GOLDEN = Path(__file__).parent / "golden"
 

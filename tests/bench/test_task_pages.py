@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from onedemo.bench.task_pages import page_text, summary_of
-from onedemo.bench.tasks import TASKS
+from onedemo.bench.task_table import TASKS
 
 PAGES = Path(__file__).parents[2] / "docs" / "tasks"
 SECTIONS = ("Description", "Action Space", "Observation Space", "Rewards", "Starting State", "Episode End", "Info",

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import onedemo.configs
-from onedemo.configs.loader import load_mapping
+from onedemo.configs.strict_yaml import load_mapping
 from onedemo.envs import IDS
 
 FOLDER = Path(onedemo.configs.__file__).parent / "rl_zoo3"

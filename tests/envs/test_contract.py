@@ -178,7 +178,7 @@ def test_a_twist_that_is_not_finite_is_refused():
     ids=["list", "single precision", "strided", "read-only"],
 )
 def test_actions_of_every_array_type_act_alike_and_compile_nothing(same, env):
-    from onedemo.envs.state import command
+    from onedemo.envs.simulation.state import command
 
     env.reset(seed=1)
     env.step(np.zeros(env.action_space.shape))
@@ -227,7 +227,7 @@ def test_importing_registers_without_a_simulator():
 
 
 def test_without_a_drawing_library_everything_but_pictures_works(monkeypatch):
-    monkeypatch.setattr("onedemo.envs.render._backends", lambda: [])
+    monkeypatch.setattr("onedemo.envs.simulation.render._backends", lambda: [])
     env = gym.make("onedemo/Stack-v0", render_mode="rgb_array")
     env.reset(seed=0)
     env.step(np.zeros(8))

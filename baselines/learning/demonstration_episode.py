@@ -1,0 +1,257 @@
+"""The ONE demonstration as one episode in an environment's own actions: what a learner may be shown.
+
+Not in the paper: there, nothing is learned from it. A plain proportional law follows the demonstrated path of the tcp;
+there is no planner, and nothing is avoided.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...envs.core.description import TaskDescription
+from ...envs.simulation.twist_control import MAX_ANGULAR, MAX_LINEAR
+from ...planner.control.controller import Controller, ControllerSettings
+from ...planner.errors import BadOption
+from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
+from ...planner.imitation.demonstration import GRIPPER_ACTIONS, Demonstration
+from ...planner.imitation.tsia import guide_index, imitated_path
+from ..policy import Observation
+
+GRIPS = {"close": 1.0, "open": -1.0}
+"""The gripper's entry of an action."""
+LEVEL = "L0"
+Goal = Callable[[Observation], Pose]
+"""Where the tcp must be at the end of the path, seen the first observation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """How the path is followed, and what comes after it.
+
+    Attributes:
+        begin: share of the path, by screw length, at which it is joined: the tcp goes straight there.
+        gain: of the law [1/s].
+        ahead: screw length [m] by which the pose that is aimed at is ahead; with the gain it gives the speed.
+        tolerance: screw length [m] to the end at which it is reached.
+        patience: seconds without getting nearer after which the end counts as reached.
+        hold: seconds of standing still at the end of the path.
+        ending: what the gripper does then: "close", "open", "none"; "": what the demonstration's does.
+        grip: seconds given to it.
+        withdraw: distance [m] by which the tool then goes back along its own axis.
+        rest: seconds of standing still at last, in which success may be judged.
+    """
+
+    begin: float = 0.0
+    gain: float = 5.0
+    ahead: float = 0.02
+    tolerance: float = 0.002
+    patience: float = 1.0
+    hold: float = 0.2
+    ending: str = ""
+    grip: float = 0.5
+    withdraw: float = 0.08
+    rest: float = 1.0
+
+    def __post_init__(self):
+        for name in ("gain", "ahead", "tolerance", "patience"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
+        for name in ("hold", "grip", "withdraw", "rest"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise BadOption(name, f"{getattr(self, name)} is not a number >= 0")
+        if not 0.0 <= self.begin < 1.0:
+            raise BadOption("begin", f"{self.begin} is not in [0, 1)")
+        if self.ending not in ("", *GRIPPER_ACTIONS):
+            raise BadOption("ending", f"{self.ending!r} is not one of {', '.join(GRIPPER_ACTIONS)}")
+
+
+class Transitions(NamedTuple):
+    """An episode, step by step.
+
+    Attributes:
+        observations: (n, ...) per entry.
+        actions: (n, m), in [-1, 1].
+        rewards: (n,).
+        next_observations: (n, ...) per entry.
+        terminations: (n,) True where the episode ended.
+        success: what the simulator said at the end.
+    """
+
+    observations: dict[str, np.ndarray]
+    actions: np.ndarray
+    rewards: np.ndarray
+    next_observations: dict[str, np.ndarray]
+    terminations: np.ndarray
+    success: bool
+
+
+def demo_episode(
+    env: Any,
+    demonstration: Demonstration,
+    segments: str | Sequence[str],
+    *,
+    goal: Goal | None = None,
+    playback: Playback | None = None,
+    seed: int = 0,
+) -> Transitions:
+    """Play segments of the demonstration at the environment's nominal start, level L0.
+
+    Args:
+        env: of ours, with one arm and a Dict as its observation, in either control mode; wrapped or not.
+        demonstration: it.
+        segments: names of those whose path is followed, one after the other.
+        goal: where the path is to end, it is moved there as a whole; None: the path is followed where it was shown.
+        playback: how.
+        seed: of the start.
+
+    Raises:
+        UnknownName: no such segment.
+        BadOption: an environment of two arms, or whose observation is another one.
+    """
+    task: TaskDescription = env.unwrapped.task
+    if len(task.arms) != 1:
+        raise BadOption("env", f"has {len(task.arms)} arms; a demonstration is played with one")
+    if "tcp_pose" not in getattr(env.observation_space, "spaces", {}):
+        raise BadOption("env", "has no tcp_pose in its observation: neither flat features nor the goal form will do")
+    names, playback = [segments] if isinstance(segments, str) else list(segments), playback or Playback()
+    path = demonstration.segment_path(names[0])
+    for name in names[1:]:
+        path = path.joined(demonstration.segment_path(name))
+    last = demonstration.segment(names[-1])
+    observation, info = env.reset(seed=seed, options={"level": LEVEL})
+    if goal is not None:
+        path = imitated_path(path, goal(observation))
+    if playback.begin > 0.0:
+        path = path[guide_index(path, playback.begin) :]
+    script = _Script(task, playback)
+    script.seen = observation
+    seen, actions, rewards, ended = [observation], [], [], []
+    for action in script.actions(path, "close" if last.held else "open", playback.ending or last.gripper):
+        observation, reward, terminated, truncated, info = env.step(action)
+        script.seen = observation
+        seen.append(observation)
+        actions.append(action)
+        rewards.append(float(reward))
+        ended.append(bool(terminated))
+        if terminated or truncated:
+            break
+    entries = {key: np.stack([each[key] for each in seen]) for key in seen[0]}
+    return Transitions(
+        {key: values[:-1] for key, values in entries.items()},
+        np.array(actions),
+        np.array(rewards),
+        {key: values[1:] for key, values in entries.items()},
+        np.array(ended),
+        bool(info["success"]),
+    )
+
+
+def tcp_to_goal(goal: int = 0) -> Goal:
+    """The tcp at a goal."""
+    return lambda observation: _pose(observation, "goal_pose", goal)
+
+
+def held_to_goal(index: int = 0, goal: int | None = None) -> Goal:
+    """The tcp where the object in the hand, held as at the first observation, is at its goal.
+
+    Args:
+        index: of the object.
+        goal: index of the goal; None: the object's.
+    """
+
+    def place(observation: Observation) -> Pose:
+        target = Pose.from_vector(observation["goal_pose"][index if goal is None else goal])
+        return target @ _pose(observation, "object_pose", index).inverse() @ _pose(observation, "tcp_pose", 0)
+
+    return place
+
+
+def as_shown(demonstration: Demonstration, segment: str, index: int) -> Goal:
+    """The tcp at the object as it was at the segment's reference when the segment ended.
+
+    Args:
+        demonstration: it.
+        segment: name of the segment.
+        index: of the object that stands for the reference.
+    """
+    reference_from_tcp = (
+        demonstration.segment(segment).reference_pose.inverse() @ (demonstration.segment_path(segment)[-1])
+    )
+    return lambda observation: _pose(observation, "object_pose", index) @ reference_from_tcp
+
+
+def twist_action(tcp: Pose, target: Pose, gain: float) -> np.ndarray:
+    """The first six entries of an `ee_twist` action: proportional to the error in world axes, its direction kept."""
+    turn = (target @ tcp.inverse()).quaternion
+    sine = float(np.linalg.norm(turn[1:]))
+    angle = 2.0 * math.atan2(sine, float(turn[0]))
+    angular = turn[1:] * (angle / sine if sine > 0.0 else 0.0)
+    linear = target.position - tcp.position
+    action = gain * np.concatenate([linear / MAX_LINEAR, angular / MAX_ANGULAR])
+    return action / max(1.0, float(np.abs(action).max()))
+
+
+class _Script:
+    """Actions that follow a path and end it, closed in a loop through `seen`, the last observation."""
+
+    def __init__(self, task: TaskDescription, playback: Playback):
+        self._task, self._playback = task, playback
+        self._controller = Controller(task.arms[0], ControllerSettings(gain=playback.gain))
+        self.seen: Observation = {}
+
+    def actions(self, path: PosePath, carried: str, ending: str) -> Iterator[np.ndarray]:
+        playback, grip = self._playback, GRIPS[carried]
+        yield from self._along(path, grip)
+        yield from self._still(playback.hold, grip)
+        if ending != "none":
+            grip = GRIPS[ending]
+            yield from self._still(playback.grip, grip)
+        if playback.withdraw > 0.0:
+            back = self._tcp @ Pose.from_position_quaternion([0.0, 0.0, -playback.withdraw])
+            yield from self._along(PosePath(back.dq[None]), grip)
+        yield from self._still(playback.rest, grip)
+
+    @property
+    def _tcp(self) -> Pose:
+        return _pose(self.seen, "tcp_pose", 0)
+
+    def _along(self, path: PosePath, grip: float) -> Iterator[np.ndarray]:
+        """Aim at the first pose that is far enough ahead, until the last one is reached or nothing gets nearer."""
+        index, last, nearest, waited = 0, len(path) - 1, math.inf, 0.0
+        while waited < self._playback.patience:
+            tcp, before = self._tcp, index
+            while index < last and _length(tcp, path[index]) < self._playback.ahead:
+                index += 1
+            left = _length(tcp, path[index])
+            if index == last and left <= self._playback.tolerance:
+                return
+            nearer = index > before or left < nearest - 0.1 * self._playback.tolerance
+            nearest = left if nearer else nearest
+            waited = 0.0 if nearer else waited + self._task.control_dt
+            yield self._toward(tcp, path[index], grip)
+
+    def _still(self, seconds: float, grip: float) -> Iterator[np.ndarray]:
+        entries = 6 if self._task.control_mode == "ee_twist" else self._task.arms[0].dof
+        for _ in range(round(seconds / self._task.control_dt)):
+            yield np.append(np.zeros(entries), grip)
+
+    def _toward(self, tcp: Pose, target: Pose, grip: float) -> np.ndarray:
+        if self._task.control_mode == "ee_twist":
+            return np.append(twist_action(tcp, target, self._playback.gain), grip)
+        speeds = self._controller(self.seen["joint_positions"][0], target) / self._task.arms[0].velocity_limits
+        return np.append(speeds / max(1.0, float(np.abs(speeds).max())), grip)
+
+
+def _pose(observation: Observation, key: str, index: int) -> Pose:
+    return Pose.from_vector(observation[key][index])
+
+
+def _length(start: Pose, end: Pose) -> float:
+    """Screw length [m] between two poses."""
+    distance, angle = start.gap(end)
+    return math.hypot(distance, METERS_PER_RADIAN * angle)

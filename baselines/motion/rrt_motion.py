@@ -1,0 +1,135 @@
+"""Legs by RRT-Connect: made when they begin, followed as they are; of one arm, and of two at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...planner.collision.clearance import room_at
+from ...planner.control.inverse_kinematics import inverse_kinematics
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.geometry.shapes import Obstacle
+from ...planner.planning.plan import Onward
+from ...planner.planning.settings import PlanSettings
+from ...planner.reactive.command import FAILED, Command, ReactiveSettings
+from ...planner.reactive.reactive_planner import ReactivePlanner
+from ...planner.robot.arm import Arm
+from ...planner.robot.body import Body
+from ..extras import needed
+from .motion_method import SCREW, Follower, LegPlanner, Mover, Relative
+from .rrt_connect import SamplingSettings, joint_way, timed
+from .rrt_planner import NO_POSTURE, NO_WAY, SamplingPlanner
+from .settings import ProgramSettings
+
+
+class SamplingFollower(ReactivePlanner):
+    """Follows ways through joint space, made from where the arm is; nothing is planned anew."""
+
+    def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, sampling: SamplingSettings):
+        self._sampling, self._goal = sampling, None
+        plan = replace(settings.plan, avoid=False, search=None)
+        super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
+
+    def go(
+        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+    ) -> None:
+        """A leg to the end of a path."""
+        super().go(path, loosely=loosely)
+        self._goal = path[-1]
+
+    def stop(self) -> None:
+        """See `ReactivePlanner`."""
+        super().stop()
+        self._goal = None
+
+    def step(self, q: ArrayLike) -> Command:
+        """See `ReactivePlanner`."""
+        if self._goal is not None and self._joints is None:
+            planner = SamplingPlanner(self.arm, self.body, self.settings.plan, self._sampling)
+            joints = np.asarray(q, dtype=np.float64)
+            still = [each for each in self._obstacles if not each.velocity.any()]
+            way = planner.way(joints, self._goal, still, self._known_allowed(still))
+            self._goal = None
+            if isinstance(way, str):
+                self.state, self.reason = FAILED, "blocked" if way == NO_WAY else way
+                self.detail = "no way through joint space was found"
+            else:
+                self._joints, self._done, self._plan_now = way, 0, False
+        return super().step(q)
+
+    def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
+        self._plan_now = False
+
+
+class SamplingMover:
+    """Legs by RRT-Connect."""
+
+    def __init__(self, sampling: SamplingSettings):
+        needed("ompl.base", "ompl")
+        self._sampling = sampling
+
+    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> LegPlanner:
+        """See `Mover`."""
+        return SamplingPlanner(arm, body, settings, self._sampling)
+
+    def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
+        """See `Mover`."""
+        return SamplingFollower(arm, body, settings, self._sampling)
+
+    def skipped(self, done: int) -> int:
+        """None: it looks at the end only."""
+        return 0
+
+    def relative(self, shown: PosePath, start: Pose) -> Relative:
+        """See `Mover`; only its end says something."""
+        return SCREW.relative(shown, start)
+
+    def way_of_two(
+        self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], seen: Callable[[], np.ndarray], dt: float
+    ) -> np.ndarray | str:
+        """See `Mover`."""
+        sampling, rng, found, g = self._sampling, np.random.default_rng(0), [[], []], seen()
+        low, high = (np.concatenate([getattr(arm, name) for arm in arms]) for name in ("lower", "upper"))
+        for arm, now, end, postures in zip(arms, q, ends, found, strict=True):
+            for k in range(sampling.seeds):
+                guess = now if k == 0 else rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi))
+                solution = inverse_kinematics(arm, end, guess, iterations=150)
+                if solution is not None and arm.margin(solution) >= sampling.margin:
+                    postures.append(solution)
+            postures.sort(key=lambda each: float(np.abs(each - now).max()))
+        pairs = [np.concatenate(pair) for pair in product(*found)]
+        pairs = [pair for pair in pairs if room_at(g, pair, 0.0, 0.1) >= 0.0]
+        if not pairs:
+            return NO_POSTURE
+        pairs.sort(key=lambda each: float(np.abs(each - q.ravel()).max()))
+        points = joint_way(g, low, high, q.ravel(), pairs[: sampling.goals], sampling)
+        if points is None:
+            return NO_WAY
+        limits = np.concatenate([arm.velocity_limits for arm in arms])
+        return timed(points, sampling.speed * limits * dt).reshape(-1, *q.shape)
+
+
+@dataclass(frozen=True, slots=True)
+class SamplingPolicySettings(ProgramSettings):
+    """Of `rrt`.
+
+    Attributes:
+        sampling: see `SamplingSettings`.
+    """
+
+    guard: bool = False
+    sampling: SamplingSettings = field(default_factory=SamplingSettings)
+
+    @property
+    def mover(self) -> Mover:
+        """See `ProgramSettings`."""
+        return SamplingMover(self.sampling)
+
+    @property
+    def plan(self) -> PlanSettings:
+        """See `ProgramSettings`."""
+        return PlanSettings(motion=self.motion, safety=self.safety, search=None, avoid=False, guard=self.guard)

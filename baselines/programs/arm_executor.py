@@ -1,0 +1,250 @@
+"""One arm with its gripper as a program moves it: generators that yield an action per tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import count
+from typing import NamedTuple
+
+import numpy as np
+
+from ...planner.errors import PlanFailed
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.geometry.shapes import Shape
+from ...planner.imitation.tsia import final_path
+from ...planner.planning.plan import Onward, Plan
+from ...planner.reactive.command import DONE, ESCAPING, FAILED, Command, ReactiveSettings
+from ...planner.robot.arm import Arm
+from ...planner.robot.body import Body
+from ..motion.motion_method import ESCAPE, PATH, SCREW, Mover
+from ..policy import LabeledPath, Observation
+from .goal_choice import Choice, Leg, choose, way_out
+from .world_model import Surroundings
+
+OPEN, CLOSE = -1.0, 1.0
+LOST = 0.03
+"""Distance [m] of an object from where it was grasped in the hand beyond which it was dropped."""
+SLIP, TURN = 0.002, 0.02
+"""Distance [m] and angle [rad] by which what is in the hand must slip before it is guarded where it is now."""
+OFF = 0.03
+"""Height [m] over its support from which on what was lifted may be led round something."""
+GLANCE = 5
+"""Ticks between looks at what is in the hand."""
+Actions = Iterator[np.ndarray]
+
+
+class _Held(NamedTuple):
+    """What is in the hand: index and shape, `tcp_from_object` when it was grasped, and as it is guarded."""
+
+    index: int
+    shape: Shape
+    grasped: Pose
+    guarded: Pose
+
+
+class Hand:
+    """Commanded joints and gripper of one arm, what is around it, and the latest observation.
+
+    The loop is closed on the joints that were commanded, not on those measured: the servos lag by 40 ms, and
+    feedback of the lag oscillates at the gains wanted here.
+
+    Attributes:
+        q: (dof,) commanded joints.
+        empty: the body with nothing in the hand.
+        observation: the latest; the policy renews it before each tick.
+        drawn: for drawing, each finished way round something that was not shown, as commanded; and the final paths that
+            plans would have followed without it.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        body: Body,
+        settings: ReactiveSettings,
+        surroundings: Surroundings,
+        observation: Observation,
+        index: int = 0,
+        *,
+        mover: Mover = SCREW,
+    ):
+        self.arm, self.settings, self.index = arm, settings.plan.motion, index
+        self.observation, self.surroundings = observation, surroundings
+        self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
+        self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
+        self._held: _Held | None = None
+        self.drawn: list[LabeledPath] = []
+        self._escape: list[np.ndarray] = []
+        self.mover, self._planner = mover, mover.follower(arm, body, settings)
+
+    @property
+    def measured_tcp(self) -> Pose:
+        """Pose of the tcp as observed."""
+        return Pose.from_vector(self.observation["tcp_pose"][self.index])
+
+    def object_pose(self, index: int) -> Pose:
+        """Pose of an object as observed."""
+        return Pose.from_vector(self.observation["object_pose"][index])
+
+    def goal_pose(self, index: int) -> Pose:
+        """Where an object must end."""
+        return Pose.from_vector(self.observation["goal_pose"][index])
+
+    def slow_down(self, pace: float) -> None:
+        """From now on use a share of the joints' speed limits; the hand must be on no path."""
+        self.arm = replace(self.arm, velocity_limits=pace * self._full)
+        self._planner = self.mover.follower(self.arm, self._planner.body, self._planner.settings)
+
+    def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
+        """From now on object `index` is part of the arm, and no longer around it."""
+        self._held = _Held(index, shape, tcp_from_object, tcp_from_object)
+        self.surroundings.without(index)
+        self._planner.hold(self.body_with(shape, tcp_from_object))
+
+    def tcp_from(self, index: int) -> Pose:
+        """Pose of an object in the hand as observed."""
+        return self.measured_tcp.inverse() @ self.object_pose(index)
+
+    def lifted(self) -> Pose:
+        """`tcp_from_object` as observed of what was grasped and lifted.
+
+        Raises:
+            PlanFailed: "dropped", it was left behind.
+        """
+        assert self._held is not None
+        now = self.tcp_from(self._held.index)
+        if now.gap(self._held.grasped)[0] > LOST:
+            raise PlanFailed("dropped", f"{self.surroundings.name(self._held.index)} is not in the hand after the lift")
+        return now
+
+    def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
+        """The body with an object in the hand, as "held"."""
+        return self.empty.holding("held", shape, tcp_from_object, self.arm)
+
+    def release(self) -> None:
+        """From now on the hand is empty."""
+        self._held = None
+        self.surroundings.without(None)
+        self._planner.hold(self.empty)
+
+    def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
+        """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
+        self.surroundings.allow(contacts)
+
+    def choose(self, leg: Leg, then: Callable[[int], Leg] | None = None) -> Choice:
+        """The best goal of a leg from here; see `choice.choose`."""
+        return choose(self.arm, self._planner.settings.plan, self.q, leg, then, self.mover)
+
+    def way_out(self, leg: Leg) -> PosePath | None:
+        """How a leg leaves from here; see `choice.way_out`."""
+        return way_out(self.arm, self._planner.settings.plan, self.q, leg)
+
+    def go(self, choice: Choice) -> Actions:
+        """Do what was chosen."""
+        *before, (last, loosely) = choice.parts
+        for path, roughly in before:
+            yield from self.follow(path, loosely=roughly)
+        yield from self.follow(last, loosely=loosely, onward=choice.onward, plan=choice.plan)
+
+    def follow(
+        self,
+        path: PosePath,
+        *,
+        loosely: bool = False,
+        onward: Onward | None = None,
+        strictly: bool = False,
+        plan: Plan | None = None,
+    ) -> Actions:
+        """Follow a path to its end, round what is in the way.
+
+        Args:
+            path: of the tcp.
+            loosely: until it is within reach of the end.
+            onward: what comes next: where there is a choice, the path ends in a posture that suits it.
+            strictly: along the path or not at all.
+            plan: what the path comes from; a hand that moves as it has planned follows that.
+
+        Raises:
+            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", what was in the
+                hand is not.
+        """
+        if plan is not None and plan.how == PATH:
+            self._planner.follow(plan, loosely=loosely)
+        else:
+            self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)
+        led = plan if plan is not None and plan.how == ESCAPE else None
+        if led:
+            nominal = final_path(self.arm.fk(self.q), led.imitated, led.guide)
+            self.drawn.append(LabeledPath("final", "", nominal))
+        for tick in count():
+            if tick % GLANCE == 0:
+                self._mind_held()
+            command = self._planned()
+            self._note_escape(command, led is not None)
+            if command.state == DONE:
+                return
+            if command.state == FAILED:
+                raise PlanFailed(command.reason, command.detail or self._stall_detail())
+            yield self._action(command.velocity)
+
+    def leave(self, path: PosePath, way: float) -> Actions:
+        """Follow a path loosely: strictly until `way` [m] from its beginning, where a detour would push things over.
+
+        Raises:
+            PlanFailed: as `follow`.
+        """
+        away = np.linalg.norm(path.positions - path.positions[0], axis=1) > way
+        free = int(np.argmax(away)) if away.any() else len(path) - 1
+        yield from self.follow(path[: free + 1], loosely=True, strictly=True)
+        if free < len(path) - 1:
+            yield from self.follow(path[free:], loosely=True)
+
+    def _note_escape(self, command: Command, led: bool) -> None:
+        if command.state == ESCAPING or (led and command.state not in (DONE, FAILED)):
+            self._escape.append(self.arm.fk(self.q).dq)
+        elif self._escape:
+            self.drawn.append(LabeledPath("escape", "", PosePath(np.array(self._escape))))
+            self._escape = []
+
+    def _mind_held(self) -> None:
+        """Guard what is in the hand where it has slipped to."""
+        if self._held is None:
+            return
+        held, now = self._held, self.tcp_from(self._held.index)
+        if held.grasped.gap(now)[0] > LOST:
+            raise PlanFailed("dropped", f"{self.surroundings.name(held.index)} is not in the hand any more")
+        distance, angle = held.guarded.gap(now)
+        if distance > SLIP or angle > TURN:
+            self._held = held._replace(guarded=now)
+            self._planner.hold(self.body_with(held.shape, now))
+
+    def wait(self, seconds: float) -> Actions:
+        """Stand still with the gripper as it is."""
+        self._planner.stop()
+        for _ in range(round(seconds / self.settings.dt)):
+            yield self.still()
+
+    def grip(self, direction: float, seconds: float) -> Actions:
+        """Open or close the gripper and keep doing so."""
+        self._gripper = direction
+        return self.wait(seconds)
+
+    def still(self) -> np.ndarray:
+        """The action of standing still, or of retreating from what comes too close."""
+        self._planner.stop()
+        return self._action(self._planned().velocity)
+
+    def _planned(self) -> Command:
+        self._planner.see(self.surroundings.seen(self.observation), self.surroundings.allowed)
+        return self._planner.step(self.q)
+
+    def _action(self, speeds: np.ndarray) -> np.ndarray:
+        normalized = np.clip(speeds / self._full, -1.0, 1.0)
+        self.q = self.q + self.settings.dt * normalized * self._full
+        return np.append(normalized, self._gripper)
+
+    def _stall_detail(self) -> str:
+        margins = np.minimum(self.q - self.arm.lower, self.arm.upper - self.q)
+        joint = int(np.argmin(margins))
+        near = f"{self.arm.joint_names[joint]} is {margins[joint]:.3f} rad from its limit"
+        return f"no progress; {near}"

@@ -1,0 +1,172 @@
+"""Pouring with two hands from the demonstration of one: the relative motion of the glasses is what was shown.
+
+Lip and rim are the frames of imitation, so that glasses of other sizes need no other demonstration. Where the pouring
+happens in the world, in which direction, and how the round glasses are turned in the hands says nothing to the task:
+of these the first choice is taken with which both arms arrive, clear of each other and of the trunk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...envs.core.description import TaskDescription
+from ...envs.pour.geometry import SOURCE, TARGET
+from ...planner.errors import PlanFailed
+from ...planner.geometry import dualquat as dq
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.imitation.bimanual import shared_translation
+from ...planner.imitation.demonstration import Demonstration
+from ...planner.imitation.segmentation import resampled
+from ..policy import LabeledPath
+from .dual_arm_executor import Paths, RollOut, TwoHands
+from .pour_goals import Size, lip, lip_direction, standing
+
+if TYPE_CHECKING:
+    from ..motion.settings import ProgramSettings
+
+POUR_YAWS = np.deg2rad((120.0, 105.0, 135.0, 90.0))
+"""Directions of pouring [rad] in the world that are tried: to the left and away from the robot."""
+SIDES = np.deg2rad((-60.0, -75.0, -90.0, -45.0))
+"""Directions of the pouring hand against that of pouring [rad]: the hand comes from the side, and tilts by a roll."""
+HOLDER_YAWS = np.deg2rad((-60.0, -30.0, -90.0))
+"""Directions of the hand with the target [rad] in the world."""
+PLACES = ((0.80, 0.0, 0.25), (0.74, 0.0, 0.15), (0.69, 0.0, 0.10))
+"""Of the target's rim at the end [m], from the middle between the two shoulders."""
+SHARE = 0.5
+"""The left hand's part of the translation; it never turns, so that the target stays upright."""
+FURTHER, LOWER = 0.004, 0.008
+"""How much further over the target and lower than shown the lip ends [m]: this target is narrower."""
+MARGIN = 0.08
+"""Distance of the joints to their limits [rad] in a roll-out with which a choice is good enough to look no further."""
+SLOW = 0.008
+"""Screw length [m] within which both hands follow: it is what limits their speed."""
+LEAST = 60
+"""Choices that are rolled out before giving up."""
+
+
+class Choice(NamedTuple):
+    """A way to do it.
+
+    Attributes:
+        forth: paths of the right and the left tcp, from the start to the end of pouring.
+        back: paths of both until the source is upright again.
+    """
+
+    forth: Paths
+    back: Paths
+
+
+class BimanualPourProgram:
+    """The program of one episode; iterate over `actions()`."""
+
+    SEGMENTS = ("approach", "carry", "return")
+    """What a demonstration of this task must have."""
+
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: TwoHands):
+        self.task, self.settings, self.hands = task, settings, hands
+        self._sizes = [Size.of(each.size) for each in task.objects]
+        self._read(shown)
+        self.paths = [LabeledPath("demonstrated", "carry", shown.segment_path("carry"))]
+
+    def _read(self, shown: Demonstration) -> None:
+        """The relative paths rim_from_lip of the demonstration."""
+        sizes = [Size.of(shown.object_sizes[each.name]) for each in self.task.objects]
+        source = standing(shown.segment("approach").reference_pose)
+        held = shown.segment_path("approach")[-1].inverse() @ source
+        self._direction = lip_direction(shown.segment_path("carry")[-1] @ held)
+        tool = held @ lip(sizes[SOURCE], self._direction)
+        rim = standing(shown.segment("carry").reference_pose) @ _top(sizes[TARGET])
+        shift = Pose.from_position_quaternion([*(FURTHER * self._direction), -LOWER])
+        step = self.settings.resample
+        self._carry, self._return = (
+            resampled(shown.segment_path(name), step).moved(rim.inverse()).with_tool(tool).moved(shift)
+            for name in ("carry", "return")
+        )
+
+    def actions(self) -> Iterator[np.ndarray]:
+        """Bring the glasses together, pour, and turn the source upright again."""
+        hands = self.hands
+        yield from hands.wait(self.settings.settle)
+        held = [hands.held(k, k) for k in (SOURCE, TARGET)]
+        hands.hold(held)
+        choice = self._chosen(held)
+        self.paths += [
+            LabeledPath("final", name, path) for name, path in zip(("source", "target"), choice.forth, strict=True)
+        ]
+        yield from hands.move(choice.forth, SLOW)
+        yield from hands.wait(self.settings.drain)
+        yield from hands.move(choice.back, SLOW)
+
+    def _chosen(self, held: list[Pose]) -> Choice:
+        """The first choice whose roll-out arrives with room to the joint limits, else the best that arrives."""
+        best: tuple[float, Choice] | None = None
+        failed = RollOut("ik_or_limit", self.hands.q, 0.0)
+        choices = product(PLACES, POUR_YAWS, HOLDER_YAWS, SIDES)
+        for _, (place, pour, holder, side) in zip(range(LEAST), choices, strict=False):
+            choice = self._choice(held, np.array(place), pour, pour + side, holder)
+            result = self.hands.roll_out(choice.forth, SLOW)
+            if result.reason:
+                failed = result
+            elif result.margin >= MARGIN:
+                return choice
+            elif best is None or result.margin > best[0]:
+                best = (result.margin, choice)
+        if best is None:
+            raise PlanFailed(failed.reason, "no place and direction of pouring was found that both arms can reach")
+        return best[1]
+
+    def _choice(self, held: list[Pose], place: np.ndarray, pour: float, pourer: float, holder: float) -> Choice:
+        """The paths of both tcps.
+
+        Args:
+            held: `tcp_from_object` of source and target.
+            place: (3,) of the target's rim at the end, from the middle between the shoulders [m].
+            pour: direction of pouring in the world [rad].
+            pourer: direction of the right hand while the source is upright [rad].
+            holder: direction of the left hand [rad].
+        """
+        shoulders = np.mean([arm.chain[0, 4:7] for arm in self.task.arms], axis=0)
+        shown_yaw = float(np.arctan2(self._direction[1], self._direction[0]))
+        turn = pour - shown_yaw
+        world_from_rim = Pose.from_yaw(shoulders + place, turn)
+        # the round glasses, turned in the hands so that the hands point where they should
+        tool = _turned(held[SOURCE], turn, pourer) @ lip(self._sizes[SOURCE], self._direction)
+        hold = _turned(held[TARGET], turn, holder) @ _top(self._sizes[TARGET])
+        right, left = (arm.fk(q) for arm, q in zip(self.task.arms, self.hands.q, strict=True))
+        now = (left @ hold).inverse() @ right @ tool
+        relative, tail = self.hands.mover.relative(self._carry, now)
+        rims, _ = shared_translation(relative[len(relative) - tail :], world_from_rim, SHARE)
+        blend = _in_equal_steps(left @ hold, rims[0], len(relative) - tail)
+        rims = PosePath(np.concatenate([blend.dqs, rims.dqs]))
+        lips = _composed(rims, relative)
+        back = self._return.moved(relative[-1] @ self._return[0].inverse())
+        still = PosePath(np.repeat(rims.dqs[-1:], len(back), axis=0))
+        from_lip, from_rim = tool.inverse(), hold.inverse()
+        return Choice(
+            (lips.with_tool(from_lip), rims.with_tool(from_rim)),
+            (_composed(still, back).with_tool(from_lip), still.with_tool(from_rim)),
+        )
+
+
+def _top(size: Size) -> Pose:
+    return Pose.from_position_quaternion([0.0, 0.0, 0.5 * size.height])
+
+
+def _turned(held: Pose, glass: float, hand: float) -> Pose:
+    """A round glass in the hand, turned so that the hand points along `hand` when the glass's yaw is `glass` [rad]."""
+    approach = held.inverse().rotation[:2, 2]
+    return held @ Pose.from_yaw([0, 0, 0], float(np.arctan2(approach[1], approach[0])) - (hand - glass))
+
+
+def _in_equal_steps(start: Pose, end: Pose, count: int) -> PosePath:
+    """`count` poses along the screw from a start, its end left out."""
+    return PosePath(dq.sclerp(start.dq, end.dq, np.arange(count) / max(count, 1)))
+
+
+def _composed(first: PosePath, second: PosePath) -> PosePath:
+    """Products pose by pose."""
+    return PosePath(dq.mul(first.dqs, second.dqs))

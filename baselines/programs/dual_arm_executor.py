@@ -1,0 +1,187 @@
+"""Two arms that hold something from the start and move together: generators that yield an action per tick.
+
+Both follow their paths at the same index, so that what one hand does to the other is as planned; the safety layer of
+both arms has the last word. There are no detours: what is in the way stops them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...envs.core.description import TaskDescription
+from ...planner.collision.robot_arrays import PREVIOUS
+from ...planner.collision.self_collision import pairs_of
+from ...planner.control.controller import Controller
+from ...planner.errors import PlanFailed
+from ...planner.geometry import dualquat as dq
+from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
+from ...planner.safety.safety_layer import BLOCKED, SafetyLayer
+from ..motion.motion_method import Mover
+from ..motion.settings import ProgramSettings
+from ..policy import LabeledPath, Observation
+from .world_model import TABLE, TABLE_MARGIN, intruders_of
+
+CLOSE = 1.0
+WRIST = 3
+"""Joints between capsules of one arm that are kept apart: across a wrist, whose axes meet, they are always close."""
+NEAR = 0.02
+"""Distance [rad] of every joint to the next of a way through joint space at which it counts as reached."""
+Paths = tuple[PosePath, PosePath]
+
+
+class RollOut(NamedTuple):
+    """What became of a kinematic run along two paths.
+
+    Attributes:
+        reason: "" if both arrived, else "blocked" or "ik_or_limit".
+        q: (2, dof) joints at its end.
+        margin: smallest distance to a joint limit on the way [rad].
+    """
+
+    reason: str
+    q: np.ndarray
+    margin: float
+
+
+class TwoHands:
+    """Commanded joints of two arms with what they hold, and the latest observation.
+
+    Attributes:
+        q: (2, dof) commanded joints.
+        observation: the latest; the policy renews it before each tick.
+        drawn: none, see `Hand`.
+    """
+
+    drawn: tuple[LabeledPath, ...] = ()
+
+    def __init__(self, task: TaskDescription, settings: ProgramSettings, observation: Observation, mover: Mover):
+        self.task, self.settings, self._safety, self.mover = task, settings.motion, settings.safety, mover
+        self._guard = settings.guard
+        self.observation, self.arms = observation, task.arms
+        self.q = np.array(observation["joint_positions"], dtype=np.float64)
+        self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies, apart=WRIST)
+        self._fixed = tuple(replace(f, margin=TABLE_MARGIN) if f.name == TABLE else f for f in task.fixtures)
+        self._controllers = [Controller(arm, settings.motion.controller) for arm in task.arms]
+        self._layer = self._renewed_layer()
+
+    def held(self, arm: int, index: int) -> Pose:
+        """`tcp_from_object` as observed."""
+        tcp = Pose.from_vector(self.observation["tcp_pose"][arm])
+        return tcp.inverse() @ Pose.from_vector(self.observation["object_pose"][index])
+
+    def hold(self, held: Sequence[Pose]) -> None:
+        """From now on hand k holds object k, as `tcp_from_object`; the two objects may come near each other."""
+        objects = self.task.objects
+        self._bodies = tuple(
+            body.holding(each.name, each.shape, pose, arm)
+            for body, each, pose, arm in zip(self.task.bodies, objects, held, self.arms, strict=True)
+        )
+        names = [name for body in self._bodies for name in body.names]
+        meant = {each.name for each in objects}
+        pairs = pairs_of(self.arms, self._bodies, apart=WRIST)
+        self._pairs = [(i, j) for i, j in pairs if names[i] == names[j] or not {names[i], names[j]} <= meant]
+        self._layer = self._renewed_layer()
+
+    def move(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
+        """Bring both hands along paths, or to their ends by another way if the mover has one; see `follow`."""
+        ends = [path[-1] for path in paths]
+        way = self.mover.way_of_two(self.arms, self.q, ends, self._seen, self.settings.dt)
+        if way is None:
+            return self.follow(paths, radius)
+        if isinstance(way, str):
+            reason = "ik_or_limit" if way == "ik_or_limit" else "blocked"
+            raise PlanFailed(reason, "no way of both arms through joint space was found")
+        return self._follow_joints(way)
+
+    def _follow_joints(self, way: np.ndarray) -> Iterator[np.ndarray]:
+        """Along joints (t, 2, dof), as far as the safety layer lets them."""
+        index, waited = 0, 0.0
+        while index < len(way):
+            wanted = (way[index] - self.q).ravel() / self.settings.dt
+            yield self._action(self._layer(self.q.ravel(), wanted).velocity.reshape(self.q.shape))
+            waited += self.settings.dt
+            if np.abs(self.q - way[index]).max() < NEAR:
+                index, waited = index + 1, 0.0
+            elif waited > self.settings.pursuit.patience:
+                raise PlanFailed("blocked", f"no progress at {index / len(way):.0%} of the way of both hands")
+
+    def follow(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
+        """Follow two paths of the same length; each pose is left when both are within a screw length of it [m].
+
+        Raises:
+            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience.
+        """
+        index, waited = 0, 0.0
+        while index < len(paths[0]):
+            if len(intruders_of(self.observation)):
+                self._layer = self._renewed_layer()
+            speeds, blocked = self._towards(paths, index)
+            yield self._action(speeds)
+            waited += self.settings.dt
+            if self._gap(paths, index) < radius:
+                index, waited = index + 1, 0.0
+            elif waited > self.settings.pursuit.patience:
+                reason = "blocked" if blocked else "ik_or_limit"
+                raise PlanFailed(reason, f"no progress at {index / len(paths[0]):.0%} of the way of both hands")
+
+    def wait(self, seconds: float) -> Iterator[np.ndarray]:
+        """Stand still."""
+        for _ in range(round(seconds / self.settings.dt)):
+            yield self.still()
+
+    def still(self) -> np.ndarray:
+        """The action of standing still, or of retreating from what comes too close."""
+        if len(intruders_of(self.observation)):
+            self._layer = self._renewed_layer()
+        return self._action(self._layer(self.q.ravel(), np.zeros(self.q.size)).velocity.reshape(self.q.shape))
+
+    def roll_out(self, paths: Paths, radius: float) -> RollOut:
+        """What would become of following two paths from now on, by kinematics alone; nothing is moved."""
+        start, previous = self.q.copy(), self._layer.work[PREVIOUS].copy()
+        margin, reason = np.inf, ""
+        try:
+            for _ in self.move(paths, radius):
+                margin = min(margin, *(arm.margin(q) for arm, q in zip(self.arms, self.q, strict=True)))
+        except PlanFailed as failure:
+            reason = failure.reason
+        end, self.q, self._layer.work[PREVIOUS] = self.q, start, previous
+        for controller in self._controllers:
+            controller.reset()
+        return RollOut(reason, end, margin)
+
+    def _towards(self, paths: Paths, index: int) -> tuple[np.ndarray, bool]:
+        """Safe speeds (2, dof) towards a pose of each path, and whether something is in the way."""
+        each = zip(self._controllers, self.q, paths, strict=True)
+        wanted = np.array([controller(q, path[index]) for controller, q, path in each])
+        filtered = self._layer(self.q.ravel(), wanted.ravel())
+        near = filtered.room < self._safety.distance
+        return filtered.velocity.reshape(self.q.shape), filtered.status == BLOCKED or near
+
+    def _gap(self, paths: Paths, index: int) -> float:
+        """The larger screw length [m] of the two hands to a pose of their paths."""
+        gaps = [dq.gap(arm.fk(q).dq, path.dqs[index]) for arm, q, path in zip(self.arms, self.q, paths, strict=True)]
+        return max(float(np.hypot(distance, METERS_PER_RADIAN * angle)) for distance, angle in gaps)
+
+    def _action(self, speeds: np.ndarray) -> np.ndarray:
+        limits = np.array([arm.velocity_limits for arm in self.arms])
+        normalized = np.clip(speeds / limits, -1.0, 1.0)
+        self.q = self.q + self.settings.dt * normalized * limits
+        return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
+
+    def _seen(self) -> np.ndarray:
+        """Both arms among all that is around, guard or not."""
+        return self._renewed_layer(guard=True).work
+
+    def _renewed_layer(self, *, guard: bool = False) -> SafetyLayer:
+        around = (*self._fixed, *intruders_of(self.observation))
+        allowed = self.task.touching
+        pairs = self._pairs
+        if not (guard or self._guard):
+            around, allowed, pairs = (), (), []
+        return SafetyLayer(
+            self.arms, self._bodies, around, self.settings.dt, settings=self._safety, allowed=allowed, pairs=pairs
+        )

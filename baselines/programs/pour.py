@@ -1,0 +1,255 @@
+"""Pouring from ONE demonstration: fetch the source, lift it, carry and tilt it as shown, seen from the target.
+
+Only the goals are new, see `pour_goals`. Of the turns of a round glass the one next to the demonstrated is taken that
+can be done beside everything around. The lift is a motion relative to where the source stands, which imitation
+anchored at the target would forget.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...envs.core.description import TaskDescription
+from ...envs.pour.geometry import SOURCE, TARGET
+from ...envs.scene.body_clearance import tool_room
+from ...planner.errors import PlanFailed
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.geometry.shapes import Obstacle, pack
+from ...planner.imitation.demonstration import Demonstration
+from ...planner.imitation.segmentation import resampled
+from ...planner.imitation.tsia import departure, imitated_path, screw_path
+from ...planner.planning.plan import Plan
+from ...planner.robot.body import Body
+from ..motion.motion_method import DIRECT, MADE, LegPlanner
+from ..policy import LabeledPath
+from .arm_executor import CLOSE, OFF, Hand
+from .pour_goals import PourGoals
+
+if TYPE_CHECKING:
+    from ..motion.settings import ProgramSettings
+
+TURNS = np.deg2rad([0.0, *(sign * turn for turn in range(15, 91, 15) for sign in (1, -1))])
+"""Turns about a glass's axis [rad] that are tried, the demonstrated direction first."""
+MARGIN = 0.08
+"""Distance of the joints to their limits [rad] in a roll-out with which a goal is good enough to look no further."""
+PACE = 0.5
+"""Share of the joints' speed limits that is used: a glass that is moved faster slips and lags behind what guards it."""
+NEAR = 0.02
+"""Distance [m] to the target from which on the source comes close to it on purpose."""
+LIFT = 0.08
+"""Height [m] of a lift straight up, where none is shown."""
+CHANCES = 3
+"""How often another way is looked for where the carry is blocked."""
+
+
+Contacts = tuple[tuple[str, str], ...]
+
+
+class Way(NamedTuple):
+    """Motions as planned, one after the other.
+
+    Attributes:
+        paths: to follow.
+        plans: what each comes from.
+        q: (dof,) joints at the end.
+        margin: smallest joint margin on the way [rad].
+        rank: 2 as shown, 1 round something or through joint space, 0 does not arrive.
+        reason: "" or why it does not arrive.
+    """
+
+    paths: tuple[PosePath, ...]
+    plans: tuple[Plan | None, ...]
+    q: np.ndarray
+    margin: float
+    rank: int
+    reason: str = ""
+
+    def then(self, other: Way) -> Way:
+        """Both, one after the other."""
+        margin, rank = min(self.margin, other.margin), min(self.rank, other.rank)
+        paths, plans = (*self.paths, *other.paths), (*self.plans, *other.plans)
+        return Way(paths, plans, other.q, margin, rank, self.reason or other.reason)
+
+    @property
+    def order(self) -> tuple[int, bool, float]:
+        """What is better."""
+        return self.rank, self.margin >= MARGIN, self.margin
+
+
+class PourProgram:
+    """The program of one episode; iterate over `actions()`."""
+
+    SEGMENTS = ("carry",)
+    """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
+
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
+        self.task, self.settings, self.hand = task, settings, hand
+        hand.slow_down(PACE)
+        self.shown = {s.name: resampled(shown.segment_path(s.name), settings.resample) for s in shown.segments}
+        self.in_hand = bool(hand.observation["motion_index"][0] >= 1.0)
+        self.goals = PourGoals(task, shown, hand.tcp_from(SOURCE) if self.in_hand else None)
+        self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.shown.items()]
+        self.source, self.target = (each.name for each in task.objects)
+        self._plan = settings.reactive.plan
+        self._standing: Contacts = (("held", task.furniture[SOURCE].name),)
+        self._wanted: tuple[Contacts, Contacts] = (
+            (("fingers", self.source), ("hand", self.source)),
+            (("held", self.target),),
+        )
+
+    def actions(self) -> Iterator[np.ndarray]:
+        """Fetch the source if it is not in the hand, lift it, pour, and turn it upright again."""
+        hand = self.hand
+        if self.in_hand:
+            yield from hand.grip(CLOSE, self.settings.close)
+        else:
+            yield from self._fetch()
+        grasped, shape = hand.tcp_from(SOURCE), self.task.objects[SOURCE].shape
+        hand.hold(SOURCE, shape, grasped)
+        if self._stands():
+            hand.allow(self._standing)
+            yield from hand.leave(self._lift(hand.arm.fk(hand.q)), OFF)
+        # the source slips a little while it is lifted: the goal is computed from how it is held now
+        held = hand.lifted()
+        hand.hold(SOURCE, shape, held)
+        yield from self._carry(held)
+        yield from hand.wait(self.settings.drain)
+        yield from self._return()
+
+    def _stands(self) -> bool:
+        """Whether the source is on its stand, from which it must be lifted."""
+        bottom = self.hand.object_pose(SOURCE).position - [0.0, 0.0, 0.5 * self.task.objects[SOURCE].size[2]]
+        return float(np.linalg.norm(bottom - self.hand.observation["furniture_pose"][SOURCE, :3])) < OFF
+
+    def _fetch(self) -> Iterator[np.ndarray]:
+        way = self._chosen_fetch()
+        before, after, *_ = way.paths
+        self.paths.append(LabeledPath("final", f"fetch {self.source}", before.joined(after)))
+        yield from self.hand.follow(before, loosely=True, plan=way.plans[0])
+        self.hand.allow(self._wanted[SOURCE])
+        yield from self.hand.follow(after, plan=way.plans[1])
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(CLOSE, self.settings.close)
+
+    def _lift(self, start: Pose) -> PosePath:
+        """As shown, from where the hand is; straight up if it is not shown."""
+        if "lift" in self.shown:
+            return departure(self.shown["lift"], start, np.inf)
+        up = Pose.from_position_quaternion([0.0, 0.0, LIFT]) @ start
+        return screw_path(start, up, self.settings.resample)
+
+    def _carry(self, held: Pose) -> Iterator[np.ndarray]:
+        """Carry, then tilt; another way is looked for where one turns out to be blocked."""
+        failed: list[float] = []
+        while True:
+            way, turn = self._chosen_carry(self.hand.q, held, failed, thoroughly=True)
+            carry, tilt = way.paths
+            self.paths.append(LabeledPath("final", "carry and pour", carry.joined(tilt)))
+            self.hand.allow(())
+            try:
+                yield from self.hand.follow(carry, loosely=True, plan=way.plans[0])
+                # near the target, the source may come as near to it as was shown
+                self.hand.allow(self._wanted[TARGET])
+                yield from self.hand.follow(tilt, plan=way.plans[1])
+                return
+            except PlanFailed:
+                failed.append(turn)
+                if len(failed) == CHANCES:
+                    raise
+
+    def _return(self) -> Iterator[np.ndarray]:
+        """Upright again, as shown if it is shown."""
+        if "return" in self.shown:
+            back = self.shown["return"]
+            here = self.hand.arm.fk(self.hand.q)
+            yield from self.hand.follow(imitated_path(back, here @ back[0].inverse() @ back[-1]), loosely=True)
+
+    def _body(self, held: Pose) -> Body:
+        return self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.hand.arm)
+
+    def _around(self, body: Body) -> list[Obstacle]:
+        """What stands around an arm; what moves is left to the moment."""
+        seen = self.hand.surroundings.seen(self.hand.observation)
+        still = [each for each in seen if not np.any(each.velocity)]
+        return [each for each in still if not (body.held and each.name == self.source)]
+
+    def _near(self, index: int, path: PosePath, body: Body) -> int:
+        """Index of the pose from which on the hand, or what it holds, stays near a glass."""
+        glass = pack([Obstacle(self.task.objects[index].shape, self.hand.object_pose(index))])
+        tool = body.tool(self.hand.arm)
+        rooms = np.array([tool_room(tool, row[None], glass) for row in path.dqs])
+        far = np.flatnonzero(rooms > NEAR)
+        return max(1, int(far[-1])) if len(far) else 1
+
+    def _planned(self, planner: LegPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
+        """A motion to the end of a path, round what is around."""
+        contacts = (*self.task.touching, *allowed)
+        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=contacts)
+        followed = path if plan.how == "joint search" or not plan.success else plan.path
+        as_shown = plan.how == DIRECT or (plan.how in MADE and plan.kept == 1.0)
+        rank = 0 if not plan.success else 2 if as_shown else 1
+        reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"
+        return Way((followed,), (plan,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason)
+
+    def _chosen_fetch(self) -> Way:
+        """The grasp, and with it the pouring, that is nearest to what was shown and can be done."""
+        hand, best, held = self.hand, None, self.goals.held
+        empty = hand.mover.planner(hand.arm, self.task.bodies[0], self._plan)
+        full = hand.mover.planner(hand.arm, self._body(held), replace(self._plan, search=None))
+        for turn in TURNS:
+            goal = self.goals.grasp(hand.object_pose(SOURCE), turn)
+            way = self._in_two(empty, imitated_path(self.shown["approach"], goal), hand.q, SOURCE)
+            if way.rank:
+                way = way.then(self._planned(full, self._lift(goal), way.q, self._standing))
+            if way.rank:
+                way = way.then(self._chosen_carry(way.q, held, [], thoroughly=False)[0])
+            if best is None or (len(way.paths), way.order) > (len(best.paths), best.order):
+                best = way
+            if best.rank and best.margin >= MARGIN:
+                break
+        assert best is not None
+        if len(best.paths) == 2 and not best.rank:
+            raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
+        return best
+
+    def _chosen_carry(self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool) -> tuple[Way, float]:
+        """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
+
+        Args:
+            q: (dof,) joints at the start.
+            held: `tcp_from_source`.
+            failed: turns that were tried in vain.
+            thoroughly: also look for ways through joint space.
+        """
+        body = self._body(held)
+        quick = self.hand.mover.planner(self.hand.arm, body, replace(self._plan, search=None))
+        tries = []
+        for turn in TURNS:
+            if turn not in failed:
+                tries.append((self._carried(quick, q, held, turn), turn))
+                if tries[-1][0].rank == 2 and tries[-1][0].margin >= MARGIN:
+                    return tries[-1]
+        best = max(tries, key=lambda each: each[0].order)
+        if best[0].rank == 0 and thoroughly:
+            thorough = self.hand.mover.planner(self.hand.arm, body, self._plan)
+            tries = [(self._carried(thorough, q, held, turn), turn) for _, turn in tries[:CHANCES]]
+            best = max(tries, key=lambda each: each[0].order)
+        return best
+
+    def _carried(self, planner: LegPlanner, q: np.ndarray, held: Pose, turn: float) -> Way:
+        """The carry and the tilting of one turn."""
+        goal = self.goals.pouring(self.hand.object_pose(TARGET), held, turn)
+        return self._in_two(planner, imitated_path(self.shown["carry"], goal), q, TARGET)
+
+    def _in_two(self, planner: LegPlanner, path: PosePath, q: np.ndarray, glass: int) -> Way:
+        """A path that ends near a glass, which may be touched only by what comes near it on purpose."""
+        split = self._near(glass, path, planner.body)
+        before, after = path[: split + 1], path[split:]
+        way = self._planned(planner, before, q, ())
+        if way.rank == 0:
+            return way._replace(paths=(before, after), plans=(None, None))
+        return way.then(self._planned(planner, after, way.q, self._wanted[glass]))

@@ -1,0 +1,40 @@
+"""Reaching as shown: the demonstrated approach, seen from where the hand must end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...envs.core.description import TaskDescription
+from ...planner.geometry.pose import Pose
+from ...planner.imitation.demonstration import Demonstration
+from ...planner.imitation.segmentation import resampled
+from ..policy import LabeledPath
+from .arm_executor import Hand
+from .goal_choice import Leg
+
+if TYPE_CHECKING:
+    from ..motion.settings import ProgramSettings
+
+
+class ReachProgram:
+    """The program of one episode; iterate over `actions()`."""
+
+    SEGMENTS = ("approach",)
+    """What a demonstration of this task must have."""
+
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
+        self.task, self.settings, self.hand = task, settings, hand
+        self.approach = resampled(shown.segment_path("approach"), settings.resample)
+        self.paths = [LabeledPath("demonstrated", "approach", self.approach)]
+
+    def actions(self) -> Iterator[np.ndarray]:
+        """Go there; half a turn of the hand makes no difference."""
+        hand, target = self.hand, self.task.objects[0].name
+        goals = tuple(hand.goal_pose(0) @ Pose.from_yaw([0.0, 0.0, 0.0], turn) for turn in (0.0, np.pi))
+        around = hand.surroundings.around(hand.observation, None)
+        choice = hand.choose(Leg(target, self.approach, goals, hand.empty, around, self.task.touching))
+        self.paths.append(LabeledPath("final", f"reach {target}", choice.path))
+        yield from hand.go(choice)

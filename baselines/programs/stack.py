@@ -1,0 +1,152 @@
+"""Stacking from the demonstration of ONE block: fetch and place, again and again.
+
+Only the goals are new: a grasp is where the demonstrated hand was relative to the object it took, a release
+is where the object must end, seen from how the hand holds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...envs.core.description import TaskDescription, TaskObject
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.imitation.demonstration import Demonstration
+from ...planner.imitation.segmentation import resampled, trimmed
+from ...planner.imitation.tsia import departure
+from ..policy import LabeledPath
+from .arm_executor import CLOSE, OFF, OPEN, Hand
+from .goal_choice import Choice, Leg
+from .world_model import TABLE
+
+if TYPE_CHECKING:
+    from ..motion.settings import ProgramSettings
+
+
+def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
+    """All `object_from_tcp` that repeat the demonstrated grasp on an object, one per symmetric yaw.
+
+    The demonstrated grasp is turned so that the fingers close along the object's narrower horizontal axis.
+    """
+    object_pose = demonstration.segment("approach").reference_pose
+    shown = object_pose.inverse() @ demonstration.segment_path("approach")[-1]
+    closing = np.abs(shown.rotation[:2, 0])  # fingers close along the x axis of the tcp
+    aligned = int(np.argmax(closing)) == int(np.argmin(target.size[:2]))
+    extra = 0.0 if aligned else np.pi / 2
+    return [Pose.from_yaw([0, 0, 0], yaw + extra) @ shown for yaw in target.symmetric_yaws]
+
+
+def releases(target: TaskObject, goal: Pose, tcp_from_object: Pose, height: float) -> list[Pose]:
+    """All poses of the tcp at which the held object is above its goal, one per symmetric yaw."""
+    above = Pose.from_position_quaternion([0, 0, height]) @ goal
+    return [above @ Pose.from_yaw([0, 0, 0], yaw) @ tcp_from_object.inverse() for yaw in target.symmetric_yaws]
+
+
+class StackProgram:
+    """The program of one episode; iterate over `actions()`."""
+
+    SEGMENTS = ("approach", "transfer")
+    """What a demonstration of this task must have."""
+
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
+        self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
+        step = settings.resample
+        self.approach = resampled(shown.segment_path("approach"), step)
+        self.transfer = resampled(trimmed(shown.segment_path("transfer"), settings.trim), step)
+        self.withdrawal = self.approach.reversed()
+        self._lifted = len(departure(self.transfer, self.transfer[0], settings.motion.departure)) - 1
+        self.paths = [
+            LabeledPath("demonstrated", "approach", self.approach),
+            LabeledPath("demonstrated", "transfer", self.transfer),
+        ]
+
+    def actions(self) -> Iterator[np.ndarray]:
+        """Fetch and place each object in order, then withdraw; what is placed or in the hand already is left so."""
+        first, in_hand = divmod(int(self.hand.observation["motion_index"][0]), 2)
+        for k in range(first, len(self.task.objects)):
+            if in_hand and k == first:
+                self.hand.allow(self._wanted(k))
+                yield from self.hand.grip(CLOSE, self.settings.close)
+            else:
+                yield from self._fetch(k)
+            yield from self._place(k)
+        last = len(self.task.objects) - 1
+        away = self.hand.way_out(self._leg(last, self.approach, (), leaving=self.withdrawal))
+        if away is not None:
+            yield from self.hand.follow(away, loosely=True)
+
+    def _wanted(self, k: int) -> tuple[tuple[str, str], ...]:
+        """Contacts that belong to moving object k: of fingers with it and with what it stands on, of it with that."""
+        objects = self.task.objects
+        under = [TABLE] + [objects[j].name for j in (k - 1,) if j >= 0]
+        own = [("fingers", objects[j].name) for j in (k - 1, k) if j >= 0]
+        return (*own, *(("held", name) for name in under))
+
+    def _fetch(self, k: int) -> Iterator[np.ndarray]:
+        self.hand.allow(self._wanted(k))
+        choice = self._chosen_fetch(k)
+        self.paths.append(LabeledPath("final", f"fetch {self.task.objects[k].name}", choice.path))
+        yield from self.hand.go(choice)
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(CLOSE, self.settings.close)
+
+    def _place(self, k: int) -> Iterator[np.ndarray]:
+        target = self.task.objects[k]
+        grasped = self.hand.tcp_from(k)
+        self.hand.hold(k, target.shape, grasped)
+        lift = self._lift(k, grasped)
+        if lift is not None:
+            yield from self.hand.leave(lift, OFF)
+        # the object slips a little while it is lifted: the goal is computed from how it is held now
+        held = self.hand.lifted()
+        choice = self.hand.choose(self._placement(k, held))
+        path = choice.path if lift is None else lift.joined(choice.path)
+        self.paths.append(LabeledPath("final", f"place {target.name}", path))
+        yield from self.hand.go(choice)
+        yield from self.hand.wait(self.settings.settle)
+        yield from self.hand.grip(OPEN, self.settings.open)
+        self.hand.release()
+
+    def _lift(self, k: int, grasped: Pose) -> PosePath | None:
+        """Off what the object stands on, as shown; None where it is in the air already."""
+        pose, half = self.hand.object_pose(k), 0.5 * float(self.task.objects[k].size[2])
+        if pose.position[2] - half > self.task.table_height + OFF:
+            return None
+        return self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
+
+    def _chosen_fetch(self, k: int) -> Choice:
+        """The grasp from which the object can also be placed."""
+        target, hand = self.task.objects[k], self.hand
+        ways = grasps(self.shown, target)
+        goals = tuple(hand.object_pose(k) @ grasp for grasp in ways)
+        leg = self._leg(k, self.approach, goals, leaving=self.withdrawal if k else None)
+        return hand.choose(leg, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
+
+    def _placement(self, k: int, held: Pose, leaving: PosePath | None = None) -> Leg:
+        """Object k from the hand to its goal."""
+        target = self.task.objects[k]
+        goals = releases(target, self.hand.goal_pose(k), held, self.settings.release_height)
+        return self._leg(k, self.transfer, tuple(goals), held=held, leaving=leaving, done=self._lifted)
+
+    def _leg(
+        self,
+        k: int,
+        demonstrated: PosePath,
+        goals: tuple[Pose, ...],
+        *,
+        held: Pose | None = None,
+        leaving: PosePath | None = None,
+        done: int = 0,
+    ) -> Leg:
+        hand, target = self.hand, self.task.objects[k]
+        body = hand.empty if held is None else hand.body_with(target.shape, held)
+        around = hand.surroundings.around(hand.observation, None if held is None else k)
+        wanted = [
+            pair
+            for pair in (*self.task.touching, *self._wanted(k))
+            if pair[1] in [obstacle.name for obstacle in around]
+        ]
+        allowed = tuple(pair for pair in wanted if pair[0] in body.names)
+        return Leg(target.name, demonstrated, goals, body, around, allowed, leaving, done=done)

@@ -1,0 +1,1 @@
+"""Scripted demonstrations, and those imported from recordings."""

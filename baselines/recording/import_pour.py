@@ -1,0 +1,86 @@
+"""A person's pouring, recorded as poses of a real Panda's hand without any glass, made into a demonstration.
+
+Where the glasses stood was not recorded. The source is taken to be held as the simulated hand holds it, and the
+target to stand where the motion ends: below and in front of the lip while it is tilted most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...envs.pour.geometry import GLASSES, SOURCE, TARGET, tcp_from_glass
+from ...envs.scene.scene_objects import extents
+from ...planner.errors import BadDemonstration
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.imitation.demonstration import Demonstration, Segment
+
+PANDA_BASE = (-0.56, 0.0, 0.912)
+"""Where the simulated Panda stands [m]."""
+BEHIND_TCP = 0.0064
+"""The grip site lies behind the tcp that Franka's controller records, along the approach [m]."""
+POURS = np.deg2rad(92.0)
+"""Tilt from which on the lip is taken to be above the target."""
+AHEAD, BELOW = 0.020, 0.015
+"""The target's axis in front of the lip's mean place then, and its rim below the lip's lowest [m]."""
+TURN = np.deg2rad(20.0)
+"""Everything is turned about the robot's vertical axis by this: then both glasses stand over the table. For the arm
+nothing is changed by it but its first joint."""
+
+
+class Placed(NamedTuple):
+    """A recording with glasses.
+
+    Attributes:
+        demonstration: with the one segment "carry".
+        stands: (2, 3) tops [m] of stands on which the glasses stand as shown, source first.
+    """
+
+    demonstration: Demonstration
+    stands: np.ndarray
+
+
+def pour_from_poses(recorded: Demonstration) -> Placed:
+    """The demonstration "carry" of a recording that begins with the source in the hand and ends tilted.
+
+    Args:
+        recorded: poses of the hand in the robot's base, fingers closing along y, approach along z.
+
+    Raises:
+        BadDemonstration: the glass is never tilted enough to pour.
+    """
+    turned = Pose.from_yaw([0, 0, 0], TURN)
+    quarter = Pose.from_yaw([0.0, 0.0, -BEHIND_TCP], 0.5 * np.pi)
+    hand = recorded.path.moved(Pose.from_position_quaternion(PANDA_BASE) @ turned).with_tool(quarter)
+    source = hand.with_tool(tcp_from_glass(GLASSES[SOURCE]))
+    tilts = np.array([pose.tilt for pose in source])
+    if not (tilts > POURS).any():
+        reason = f"the glass is tilted by {np.degrees(tilts.max()):.0f} deg at most; pouring begins at 92"
+        raise BadDemonstration(recorded.name, "path", reason)
+    forward = hand[0].rotation[:, 2] * [1.0, 1.0, 0.0]
+    forward /= np.linalg.norm(forward)
+    lips = _lips(source, forward)[tilts > POURS]
+    rim = np.append((lips.mean(axis=0) + AHEAD * forward)[:2], lips[:, 2].min() - BELOW)
+    heights = [glass.height for glass in GLASSES]
+    bottoms = np.stack([source[0].position - [0.0, 0.0, 0.5 * heights[SOURCE]], rim - [0.0, 0.0, heights[TARGET]]])
+    target = Pose.from_position_quaternion(rim - [0.0, 0.0, 0.5 * heights[TARGET]])
+    demonstration = replace(
+        recorded,
+        task="pour",
+        tcp_frame="grip_site",
+        path=hand,
+        segments=(Segment("carry", 0, len(hand) - 1, "target", target, "source"),),
+        object_sizes={glass.name: extents(glass.shape) for glass in GLASSES},
+    )
+    return Placed(demonstration, bottoms)
+
+
+def _lips(source: PosePath, forward: np.ndarray) -> np.ndarray:
+    """(n, 3) the point of the rim that is in front at the start, along the way [m]."""
+    glass = GLASSES[SOURCE]
+    side = source[0].rotation.T @ forward
+    return source.with_tool(
+        Pose.from_position_quaternion([*(glass.radius * side[:2] / np.linalg.norm(side[:2])), 0.5 * glass.height])
+    ).positions

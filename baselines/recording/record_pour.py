@@ -1,0 +1,52 @@
+"""The script of the demonstration `pour`: its waypoints, in the open. A script moved this arm, not a person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...envs.pour.geometry import BACK, GLASSES, SOURCE, TARGET, TILTED, UP, grasp, pouring
+from ...planner.geometry.pose import Pose
+from ...planner.imitation.demonstration import Demonstration
+from .scripted_recorder import ScriptedMotion, Waypoint, recorded
+
+YAW = np.deg2rad(75.0)
+"""Direction of the hand: level, away from the arm and across, so that it can tilt forward above the target."""
+SHORT = 0.13
+"""How far before the source the hand gets level with it [m]."""
+LIFT = 0.12
+"""Height [m] of the lift."""
+HALF = np.deg2rad(65.0)
+"""Tilt with which the lip comes to the pour point: with less, the glass would be where the target is."""
+CAREFUL, SLOW = 0.6, 0.1
+"""Largest speeds with beads at the lip [rad/s] and at the grasp [m/s]."""
+DRAIN = 0.8
+"""Seconds of holding the glass tilted."""
+
+
+def pour_script(glasses: np.ndarray) -> Iterator[ScriptedMotion]:
+    """The motions for glasses at poses (2, 7)."""
+    glass, center = GLASSES[SOURCE], glasses[SOURCE, :3]
+    rim = glasses[TARGET, :3] + [0.0, 0.0, 0.5 * GLASSES[TARGET].height]
+    hand = grasp(glass, center, YAW)
+    before = hand @ Pose.from_position_quaternion([0.0, 0.0, -SHORT])
+    yield ScriptedMotion("approach", (Waypoint(before), Waypoint(hand, SLOW)), "source", gripper=1.0)
+    raised = Pose.from_position_quaternion([0.0, 0.0, LIFT]) @ hand
+    yield ScriptedMotion("lift", (Waypoint(raised, SLOW),), held="source")
+    ready = Waypoint(pouring(glass, rim, YAW, 0.0, BACK, UP))
+    half = Waypoint(pouring(glass, rim, YAW, HALF), angular=CAREFUL)
+    full = Waypoint(pouring(glass, rim, YAW, TILTED), angular=CAREFUL, hold=DRAIN)
+    yield ScriptedMotion("carry", (ready, half, full), "target", held="source")
+    yield ScriptedMotion("return", (half, ready), "target", held="source")
+
+
+def record_pour(env: Any) -> Demonstration:
+    """The demonstration, given in `onedemo/Pour-v0` (unwrapped) at level L0.
+
+    Raises:
+        BadDemonstration: the simulator saw no success.
+    """
+    observation, _ = env.reset(seed=0, options={"level": "L0"})
+    return recorded(env, observation, pour_script(observation["object_pose"]), name="pour")

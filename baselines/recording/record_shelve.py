@@ -1,0 +1,60 @@
+"""The script of the demonstration `shelve`, in the LOWER shelf: its waypoints, in the open. A script moved this arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...planner.geometry.pose import Pose
+from ...planner.imitation.demonstration import Demonstration
+from .scripted_recorder import ScriptedMotion, Waypoint, recorded
+
+GRASP = Pose.from_position_quaternion([-0.055, 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
+"""Hand (tcp) in the book's frame: 25 mm behind the spine, level, fingers on the covers."""
+BEFORE, LIFT, WAY_IN = 0.13, 0.15, 0.22
+"""Ways [m]: to the grasp, up from the stand, into the shelf and out of it again."""
+ABOVE = 0.003
+"""Height above the shelf's board at which the book goes in and is let go [m]."""
+OPENING = 0.047
+"""Gap between the finger pads that lets a book go [m]: a wider one would push its neighbors."""
+SLOW = 0.12
+"""Speed into and out of the shelf [m/s]."""
+
+
+SCENE = {"n_books": 1, "shelf": "lower"}
+"""Arguments of the environment that the demonstration is given in."""
+
+
+def shelve_script(observation: dict[str, np.ndarray], width: float) -> Iterator[ScriptedMotion]:
+    """The motions for what is observed, with a gripper that opens to `width` [m]."""
+    grasp = Pose.from_vector(observation["object_pose"][0]) @ GRASP
+    release = _up(ABOVE) @ Pose.from_vector(observation["goal_pose"][0]) @ GRASP
+    lifted, before = _up(LIFT) @ grasp, release @ _along(-WAY_IN)
+    yield ScriptedMotion("approach", (Waypoint(grasp @ _along(-BEFORE)),))
+    yield ScriptedMotion("reach", (Waypoint(grasp, SLOW),), "book0", gripper=1.0)
+    yield ScriptedMotion("lift", (Waypoint(lifted),), held="book0")
+    yield ScriptedMotion("carry", (Waypoint(before),), held="book0")
+    insert = (Waypoint(release, SLOW),)
+    yield ScriptedMotion("insert", insert, "book0", "book0", -OPENING / width)
+    yield ScriptedMotion("retreat", (Waypoint(before, SLOW),), "book0")
+
+
+def _up(height: float) -> Pose:
+    return Pose.from_position_quaternion([0.0, 0.0, height])
+
+
+def _along(way: float) -> Pose:
+    """A way along the direction that the hand points in, in the hand's frame."""
+    return Pose.from_position_quaternion([0.0, 0.0, way])
+
+
+def record_shelve(env: Any) -> Demonstration:
+    """The demonstration, given in `onedemo/Shelve-v0` (unwrapped) made with `SCENE`, at level L0.
+
+    Raises:
+        BadDemonstration: the simulator saw no success.
+    """
+    observation, _ = env.reset(seed=0, options={"level": "L0"})
+    return recorded(env, observation, shelve_script(observation, env.task.gripper_width[0]), name="shelve")

@@ -1,0 +1,1 @@
+"""One tree of paragraphs, tables and pictures, written as Markdown or HTML."""

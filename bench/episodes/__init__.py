@@ -1,0 +1,1 @@
+"""Scenarios, episodes and their records."""

@@ -1,0 +1,1 @@
+"""`onedemo geometric`: paths without physics."""

@@ -1,0 +1,128 @@
+"""Whether hand and held object touch an obstacle along a path, by python-fcl, at the poses and between them.
+
+Between two poses the path is taken for a screw, whoever made it. A point of a rigid body moves along it at a constant
+speed, which is largest at an end of a capsule's core: what is farther away at both poses than it can go in between does
+not touch; else the stretch is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...planner.geometry import dualquat as dq
+from ...planner.geometry.pose import PosePath
+from ...planner.geometry.shapes import Obstacle
+from ...planner.judge.geometry import Moment, Scene
+from ...planner.robot.body import Body
+
+FAR = 0.05
+"""Clearances above this [m] are not told apart."""
+SHORTEST = 2e-4
+"""Way [m] of a capsule's point between two poses below which an undecided stretch counts as touching."""
+HALVINGS = 24
+
+
+class Clearance(NamedTuple):
+    """What was found of a path.
+
+    Attributes:
+        clear: nothing touches, between the poses either.
+        least: smallest distance at the poses that were looked at [m], at most FAR.
+    """
+
+    clear: bool
+    least: float
+
+
+class ToolJudge:
+    """Judges paths of one tool among obstacles.
+
+    Args:
+        tool: (m, 7) capsules in the tcp's frame, see `Body.tool`.
+        obstacles: that stand still.
+    """
+
+    def __init__(self, tool: np.ndarray, obstacles: Sequence[Obstacle]):
+        rows = np.column_stack([np.zeros(len(tool)), tool])
+        self._scene = Scene(Body(rows, tuple(f"capsule{k}" for k in range(len(tool)))), obstacles)
+        self._ends, self._radii = tool[:, :6].reshape(-1, 2, 3), tool[:, 6]
+        self._turns = np.array([_turn_to(b - a) for a, b in self._ends])
+        self._count = len(obstacles)
+
+    def judged(self, path: PosePath) -> Clearance:
+        """The verdict on a path."""
+        if not self._count:
+            return Clearance(True, FAR)
+        moment = self._moment(path.dqs)
+        room = self._rooms(moment)
+        least = min(FAR, float(room.min()))
+        if least <= 0.0:
+            return Clearance(False, least)
+        return self._between(path.dqs, room, least)
+
+    def _between(self, poses: np.ndarray, room: np.ndarray, least: float) -> Clearance:
+        """Halve every stretch that its ends do not prove clear."""
+        first, last, before, after = poses[:-1], poses[1:], room[:-1], room[1:]
+        for _ in range(HALVINGS):
+            way = self._ways(first, last)
+            # of what is beyond FAR only that is known: it is taken for FAR
+            undecided = (before + after <= way[:, :, None]).any(axis=(1, 2))
+            if not undecided.any():
+                return Clearance(True, least)
+            if (way.max(axis=1)[undecided] < SHORTEST).any():
+                return Clearance(False, least)
+            first, last, before, after = (each[undecided] for each in (first, last, before, after))
+            middle = dq.sclerp(first, last, np.full(len(first), 0.5))
+            found = self._rooms(self._moment(middle))
+            least = min(least, float(found.min()))
+            if least <= 0.0:
+                return Clearance(False, least)
+            first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
+            before, after = np.concatenate([before, found]), np.concatenate([found, after])
+        return Clearance(False, least)
+
+    def _rooms(self, moment: Moment) -> np.ndarray:
+        """(n, m, k) distances [m], at most FAR."""
+        out = np.minimum(self._scene.at_least(moment), FAR)
+        near = np.argwhere(out < FAR)
+        if len(near):
+            out[tuple(near.T)] = np.minimum(self._scene.distances(moment, near), FAR)
+        return out
+
+    def _moment(self, poses: np.ndarray) -> Moment:
+        """Where the capsules are at poses (n, 8)."""
+        turn, place = _rotations(poses), dq.translation(poses)
+        ends = np.einsum("nij,mej->nmei", turn, self._ends) + place[:, None, None]
+        turns = turn[:, None] @ self._turns
+        nothing = np.empty((len(poses), 0, 3))
+        return Moment(np.zeros(len(poses)), np.empty((len(poses), 0)), nothing, nothing, ends, turns, turn)
+
+    def _ways(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+        """(n, m) longest way [m] of a point of each capsule along the screws."""
+        twist = dq.twist_from_dq(dq.mul(dq.conj(first), last))
+        v, w = twist[:, None, None, :3], twist[:, None, None, 3:]
+        speed = np.linalg.norm(v + np.cross(w, self._ends[None]), axis=-1).max(axis=-1)
+        return speed + np.linalg.norm(twist[:, None, 3:], axis=-1) * self._radii
+
+
+def _rotations(poses: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) of dual quaternions (n, 8)."""
+    w, x, y, z = poses[:, :4].T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _turn_to(direction: np.ndarray) -> np.ndarray:
+    """A rotation matrix whose z axis is along a vector; any, if that is zero."""
+    length = np.linalg.norm(direction)
+    z = direction / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
+    x = np.cross(z, np.eye(3)[int(np.abs(z).argmin())])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])

@@ -1,0 +1,121 @@
+"""Numbers of a path without physics, the same for whoever made it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...planner.geometry import dualquat as dq
+from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
+from ...planner.imitation.tsia import guide_index, imitated_path
+from .parts import POURING, Part
+
+REACHED, TURNED = 0.005, 0.05
+"""A goal is reached within these [m], [rad]; as the judge of plans has it."""
+SAMPLES = 200
+"""Points, at equal steps of the tcp's way, that smoothness is taken from."""
+FINE, COARSE = 45, 15
+"""Steps of the search for the nearest point on a screw: down to rounding, and to some micrometers."""
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+def ending(path: PosePath, goal: Pose) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of a path's end to the goal."""
+    distance, angle = path[-1].gap(goal)
+    return float(distance), float(angle)
+
+
+def is_reached(distance: float, angle: float) -> bool:
+    """Whether a path with these errors at its end reaches the goal."""
+    return distance <= REACHED and angle <= TURNED
+
+
+def tilt(part: Part, path: PosePath) -> float:
+    """Largest tilt while carrying [degrees]; before pouring begins, where something is poured."""
+    return float(np.degrees(part.tilts(part.carried(path)).max()))
+
+
+def rim_drift(part: Part, path: PosePath, goal: Pose) -> float | None:
+    """How far [m] the lip is, while the glass is tilted by more than 60 degrees, from where it was shown.
+
+    Both as seen from the goal, which stands for the target glass. The demonstration's lip goes along a curve, of which
+    the nearest point counts. None where nothing is poured; NaN where a path never tilts that far.
+    """
+    if part.lip is None:
+        return None
+    tilted = part.tilts(path) > POURING
+    if not tilted.any():
+        return float("nan")
+    seen = part.lips(path.moved(goal.inverse()))[tilted]
+    return float(max(_to_line(point, part.lip_curve) for point in seen))
+
+
+def _to_line(point: np.ndarray, line: np.ndarray) -> float:
+    """Distance of a point (3,) to the straight pieces between points (n, 3)."""
+    a, along = line[:-1], np.diff(line, axis=0)
+    share = ((point - a) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300)
+    nearest = a + np.clip(share, 0.0, 1.0)[:, None] * along
+    return float(np.linalg.norm(point - nearest, axis=1).min())
+
+
+def way(path: PosePath) -> float:
+    """Length of the tcp's way [m]."""
+    return float(np.linalg.norm(np.diff(path.positions, axis=0), axis=1).sum())
+
+
+def turning(path: PosePath) -> float:
+    """Sum of all rotations [rad]."""
+    return float(dq.gap(path.dqs[:-1], path.dqs[1:])[1].sum())
+
+
+def jerk(path: PosePath) -> float:
+    """Natural logarithm of the dimensionless jerk of the tcp at constant speed; less is smoother.
+
+    A path has no time: its points are taken at equal steps of its way, and jerk is their third difference.
+    NaN where the tcp stays in place.
+    """
+    positions = path.positions
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    if along[-1] < 1e-6:
+        return float("nan")
+    at = np.linspace(0.0, along[-1], SAMPLES)
+    points = np.column_stack([np.interp(at, along, positions[:, k]) for k in range(3)])
+    third = np.diff(points, n=3, axis=0) * (SAMPLES - 1) ** 3
+    return float(np.log(max((third**2).sum(axis=1).mean(), 1e-300) ** 0.5 / along[-1]))
+
+
+def aligned_deviation(part: Part, path: PosePath, goal: Pose, guide: float) -> float:
+    """Method-aligned: largest distance [m] of the goal-aligned demonstration behind the guiding pose to a path.
+
+    In screw length. What follows imitation alone has none by construction, so this says nothing about who is better.
+    """
+    imitated = imitated_path(part.shown, goal)
+    return curve_gap(imitated[guide_index(imitated, guide) :], path, COARSE)
+
+
+def curve_gap(poses: PosePath, path: PosePath, refinements: int = FINE) -> float:
+    """Largest distance of poses to a path [m], in screw length; between its own poses the path is a screw."""
+    if len(path) == 1:
+        return float(_gap(poses.dqs, path.dqs).max())
+    distance = np.linalg.norm(poses.positions[:, None] - path.positions, axis=-1)
+    cosine = np.minimum(np.abs(poses.quaternions @ path.quaternions.T), 1.0)
+    nearest = np.hypot(distance, METERS_PER_RADIAN * 2.0 * np.arccos(cosine)).argmin(axis=1)
+    found = _gap(poses.dqs, path.dqs[nearest])
+    for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, len(path) - 2)):
+        found = np.minimum(found, _to_screws(poses.dqs, path.dqs[first], path.dqs[first + 1], refinements))
+    return float(found.max())
+
+
+def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    distance, angle = dq.gap(a, b)
+    return np.hypot(distance, METERS_PER_RADIAN * angle)
+
+
+def _to_screws(poses: np.ndarray, first: np.ndarray, last: np.ndarray, refinements: int) -> np.ndarray:
+    """(n,) distances of poses (n, 8) to screws, by golden sections."""
+    low, high = np.zeros(len(poses)), np.ones(len(poses))
+    for _ in range(refinements):
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        nearer = _gap(poses, dq.sclerp(first, last, left)) < _gap(poses, dq.sclerp(first, last, right))
+        low, high = np.where(nearer, low, left), np.where(nearer, right, high)
+    return _gap(poses, dq.sclerp(first, last, 0.5 * (low + high)))

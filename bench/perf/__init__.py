@@ -1,0 +1,1 @@
+"""`onedemo perf`: speeds as ratios."""

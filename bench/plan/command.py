@@ -1,0 +1,239 @@
+"""`onedemo plan`: a scene in; a plan, the judge's verdict on it and a picture out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...configs.plan_scene import Scene, load_scene, pose_of, shipped_scene
+from ...configs.plan_scene_schema import UrdfRobot
+from ...planner.errors import BadConfig, BadShape, OneDemoError, PlanFailed, UnknownName
+from ...planner.geometry.pose import Pose, PosePath
+from ...planner.geometry.shapes import Obstacle, Sphere
+from ...planner.judge.certify import Certificate, certify
+from ...planner.log.motion_log import write_log
+from ...planner.planning.plan import ACCELERATION, Plan
+from ...planner.planning.planner import Planner
+from ...planner.planning.planning_scene import SceneWork
+from ...planner.planning.settings import PlanSettings
+from ...planner.robot.arm import Arm
+from ...planner.robot.body import Body
+from ...planner.safety.safety_layer import contact_masks
+from ..console import console, labeled
+from .scene_plan import Planned
+
+FOUND, NOT_FOUND, REFUSED = 0, 1, 3
+"""Exit codes: REFUSED is a plan that the judge does not accept, which must never be."""
+FIGURES = (".png", ".pdf", ".svg")
+
+
+def run_plan(
+    scene: str,
+    overrides: list[str],
+    figure: Path | None,
+    output: Path | None,
+    *,
+    judged: bool = True,
+    smooth: bool = False,
+    timed: bool = False,
+) -> int:
+    """Plan in a scene, print what came of it and write what is wanted; returns the exit code.
+
+    Args:
+        scene: a YAML file, or the name of a shipped scene.
+        overrides: `key=value` changes.
+        figure: a picture to write; the ending tells the kind.
+        output: the plan as a log that `planner.certify` reads.
+        judged: whether the independent judge looks at the plan.
+        smooth: whether the plan is led along a C1 curve, see `Plan.smoothed`.
+        timed: whether it is timed under limits, see `Plan.timed`.
+
+    Raises:
+        BadConfig: the scene, an override or a file to write cannot be used.
+    """
+    if figure is not None and figure.suffix.lower() not in FIGURES:
+        raise BadConfig("command line", "--figure", f"{figure} does not end in {', '.join(FIGURES)}")
+    loaded = load_scene(scene_path(scene), overrides)
+    err = console(stderr=True)
+    with err.status("building the arm and the planner (compiled on first use: about a minute)"):
+        planned = refined(plan_in(loaded), smooth=smooth, timed=timed)
+    certificate = certify(planned.log) if judged and planned.plan.success else None
+    out = console()
+    for label, style, text in _lines(planned, certificate):
+        out.print(labeled(label, style, text))
+    if output is not None and planned.plan.success:
+        _written("--output", output, lambda: write_log(planned.log, output))
+        out.print(f"plan        {output}")
+    elif output is not None:
+        err.print(labeled("note", "yellow", f"there is no plan, so {output} was not written"))
+    if figure is not None:
+        from .figure import draw_plan
+
+        _written("--figure", figure, lambda: draw_plan(planned, certificate, [figure]))
+        out.print(f"figure      {figure}")
+    if not planned.plan.success:
+        return NOT_FOUND
+    return FOUND if certificate is None or certificate.ok else REFUSED
+
+
+def scene_path(scene: str) -> Path:
+    """The file itself, or the shipped scene of that name, also for a path as it stands in the source tree."""
+    path = Path(scene)
+    if path.is_file():
+        return path
+    if path.suffix in ("", ".yaml") and str(path.parent) in (".", "configs/scenes"):
+        return shipped_scene(path.stem)
+    raise BadConfig(path, "", "no such file")
+
+
+def plan_in(scene: Scene) -> Planned:
+    """Plan in a scene.
+
+    Raises:
+        BadConfig: the robot, the start, the settings or a name in the scene cannot be used.
+    """
+    from ...baselines.factory import settings_from
+
+    settings = settings_from(PlanSettings, scene.config.settings, f"{scene.source}: settings")
+    arm, body, home = _robot(scene)
+    start = home
+    if scene.config.start != "home":
+        with scene.blaming("start"):
+            start = arm.checked(np.array(scene.config.start, dtype=np.float64))
+    if scene.held is not None:
+        with scene.blaming("held"):
+            body = body.holding(scene.held.name, scene.held.shape, scene.held.tcp_from_object, arm)
+    with scene.blaming("allowed"):
+        contact_masks(body.names, scene.obstacles, scene.allowed)
+    planner = Planner(arm, body, settings)
+    _warm_up(planner, start)
+    with scene.blaming("obstacles"):
+        plan = planner.plan(
+            scene.demonstrated, start, scene.goal, scene.obstacles, allowed=scene.allowed, seed=scene.config.seed
+        )
+    return Planned(scene, arm, body, start, settings, plan)
+
+
+def refined(planned: Planned, *, smooth: bool, timed: bool) -> Planned:
+    """The plan made smooth, then timed, as is wanted; no plan where that does not stay clear."""
+    plan = planned.plan
+    if not plan.success:
+        return planned
+    try:
+        plan = plan.smoothed() if smooth else plan
+        plan = plan.timed() if timed else plan
+    except PlanFailed as failure:
+        plan = plan.refused(failure)
+    return planned._replace(plan=plan)
+
+
+def _robot(scene: Scene) -> tuple[Arm, Body, np.ndarray]:
+    """Arm, body and usual joints of the scene's robot."""
+    robot = scene.config.robot
+    if isinstance(robot, UrdfRobot):
+        return _urdf_robot(scene, robot)
+    from ...envs.scene.robot_bodies import robot_body
+    from ...envs.scene.robots import ROBOTS
+    from ...envs.scene.scene import compiled_scene
+
+    if robot not in ROBOTS:
+        with scene.blaming("robot"):
+            raise UnknownName("robot", robot, ROBOTS)
+    compiled = compiled_scene(robot)
+    return compiled.arms[0].arm, robot_body(robot), compiled.home[0]
+
+
+def _urdf_robot(scene: Scene, robot: UrdfRobot) -> tuple[Arm, Body, np.ndarray]:
+    from ...planner.robot.body_readers import body_from_urdf
+
+    with scene.blaming("robot"):
+        file = scene.file(robot.urdf)
+        base = None if robot.base is None else pose_of(robot.base)
+        speeds = robot.velocity_limits
+        if speeds is not None and len(speeds) == 1:
+            speeds = speeds[0]
+        arm = _arm_from_urdf(file, robot.tcp_frame, base, speeds)
+        low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+        return arm, body_from_urdf(file, arm), 0.5 * (low + high)
+
+
+def _arm_from_urdf(file: Path, tcp_frame: str, base: Pose | None, speeds: Any) -> Arm:
+    try:
+        return Arm.from_urdf(file, tcp_frame=tcp_frame, world_from_base=base, velocity_limits=speeds)
+    except OneDemoError:
+        raise
+    except ValueError:  # NumPy's, of broadcasting
+        raise BadShape("velocity_limits", np.shape(speeds), "one number, or one per joint") from None
+
+
+def _warm_up(planner: Planner, start: np.ndarray) -> None:
+    """Load the compiled loops, so that the time of the plan is that of planning."""
+    here = planner.arm.fk(start)
+    far = Obstacle(Sphere(0.01), Pose.from_position_quaternion((0.0, 0.0, 50.0)))
+    planner.plan(PosePath(here.dq[None]), start, here, (far,))
+
+
+def _lines(planned: Planned, certificate: Certificate | None) -> Iterator[tuple[str, str, str]]:
+    """Label, style and text of every line for the terminal."""
+    plan, name = planned.plan, planned.scene.name
+    spent = f"in {_time(plan.seconds)}, {plan.tries} {'try' if plan.tries == 1 else 'tries'}"
+    if not plan.success:
+        yield "not found ", "red", f"{name}: {plan.why}; {spent}"
+        if plan.tree is not None:
+            kept = int((plan.tree.verdicts == 0).sum())
+            yield "looked at ", "", f"{len(plan.tree.poses)} nodes in the last escape tree, {kept} of them kept"
+        return
+    seconds = plan.dt * (len(plan.joints) - 1)
+    yield "found     ", "green", f"{name}: {_how(plan)}, {spent}; the motion takes {seconds:.1f} s"
+    yield "clearance ", "", _clearance(planned, certificate)
+    yield "joints    ", "", f"{plan.margin:.2f} rad from a limit at the least; {_pace(planned)}"
+    if certificate is None:
+        yield "not judged", "yellow", "see --certify"
+    elif certificate.ok:
+        errors = f"{1e3 * (certificate.position_error or 0.0):.1f} mm, {np.degrees(certificate.angle_error or 0.0):.1f}"
+        yield "judged    ", "green", f"sound by other means (fcl, Pinocchio); at the goal within {errors} degrees"
+    else:
+        yield "judged    ", "red", f"REFUSED: {'; '.join(certificate.reasons)}"
+    if any(np.any(o.velocity) for o in planned.scene.obstacles):
+        yield "note      ", "yellow", "moving obstacles: planned as if they stood still, judged as they move"
+
+
+def _how(plan: Plan) -> str:
+    ways = {"direct": "as demonstrated, no detour", "joint search": "by a search in joint space"}
+    found = ways.get(plan.how, f"{plan.detours} {'detour' if plan.detours == 1 else 'detours'} by escape trees")
+    return ", ".join((found, *plan.refined))
+
+
+def _pace(planned: Planned) -> str:
+    plan = planned.plan
+    if "timed" in plan.refined:
+        speeds = np.abs(np.diff(plan.joints, axis=0)) / plan.dt / planned.arm.velocity_limits
+        return f"{speeds.max(initial=0.0):.0%} of the speed limits and up to {ACCELERATION:g} rad/s^2"
+    return f"safety layer at work in {plan.changed / max(len(plan.joints) - 1, 1):.0%}"
+
+
+def _clearance(planned: Planned, certificate: Certificate | None) -> str:
+    if not planned.scene.obstacles:
+        return "nothing to touch"
+    if certificate is not None:
+        closest = min(certificate.clearances, key=certificate.clearances.__getitem__)
+        kept = f"{1e3 * planned.settings.safety.distance:.0f} mm must be kept"
+        return f"{1e3 * certificate.clearance:.1f} mm at the least ({closest}), between the ticks too; {kept}"
+    scene = planned.scene
+    work = SceneWork.of(planned.arm, planned.body, scene.obstacles, planned.settings, scene.allowed)
+    room = min(work.room(q) for q in planned.plan.joints)
+    return f"{1e3 * room:.1f} mm more than must be kept, at the ticks"
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.1f} ms" if seconds < 1.0 else f"{seconds:.1f} s"
+
+
+def _written(option: str, path: Path, write: Any) -> None:
+    try:
+        write()
+    except OSError as error:
+        raise BadConfig("command line", option, f"{path}: {error.strerror or type(error).__name__}") from None

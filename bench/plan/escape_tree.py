@@ -1,0 +1,76 @@
+"""Painting an escape tree: its edges, kept and rejected, and the planes along the branch that came home."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...planner.escape.repet import EscapeTree
+from ...planner.geometry.pose import PosePath
+from ..drawing.convex_view import Solid, View, hidden_by
+
+PLANE, KEPT, REJECTED = "#2f9e5b", "#7a7a7a", "#d9482b"
+PLANE_SIDE = 0.05
+"""Of the square that stands for a plane [m]."""
+MOST_REJECTED = 1500
+"""More would only be a blot."""
+DIM = 0.34
+"""Opacity behind a solid."""
+
+
+def paint_tree(
+    axes: Any, view: View, tree: EscapeTree, path: PosePath, solids: Sequence[Solid], *, every: bool = False
+) -> None:
+    """Edges, kept and rejected, and the planes along the branch that came home, or every plane."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    positions = PosePath(tree.poses).positions
+    child = np.flatnonzero(tree.parents >= 0)
+    edges = np.stack([positions[tree.parents[child]], positions[child]], axis=1)
+    good = np.isin(tree.verdicts[child], (0, 4))
+    bad = np.flatnonzero(tree.verdicts[child] == 1)
+    bad = bad[np.unique(np.linspace(0, len(bad) - 1, min(len(bad), MOST_REJECTED)).astype(int))] if len(bad) else bad
+    for rows, color, width, alpha in ((bad, REJECTED, 0.35, 0.4), (np.flatnonzero(good), KEPT, 0.6, 0.75)):
+        if not len(rows):
+            continue
+        dim = np.where(hidden_by(solids, edges[rows].mean(axis=1), view), DIM, 1.0)
+        lines = LineCollection(list(view.flat(edges[rows])), colors=color, linewidths=width, alpha=alpha * dim)
+        lines.set_zorder(24)
+        axes.add_collection(lines)
+    squares = []
+    for plane in tree.planes if every else [tree.planes[k] for k in branch_planes(tree, path)]:
+        side = 0.5 * PLANE_SIDE
+        squares.append(
+            [plane.origin + side * (a * plane.u + b * plane.v) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+        )
+    if not squares:
+        return
+    squares.sort(key=lambda square: float(view.depth(np.mean(square, axis=0))))
+    polygons = [view.flat(np.array(square)) for square in squares]
+    axes.add_collection(
+        PolyCollection(polygons, facecolors=PLANE, edgecolors=PLANE, linewidths=0.7, alpha=0.28, zorder=26)
+    )
+
+
+def branch_planes(tree: EscapeTree, path: PosePath) -> list[int]:
+    """Planes at the nodes of the branch that comes home closest to a path; of all nodes where none came home."""
+    origins = np.array([plane.origin for plane in tree.planes]).reshape(-1, 3)
+    ends = np.flatnonzero(tree.verdicts == 4)
+    positions = PosePath(tree.poses).positions
+    if not len(ends) or not len(origins):
+        return [int(k) for k in np.unique(np.linspace(0, len(origins) - 1, 14).astype(int))] if len(origins) else []
+    best: list[int] = []
+    least = math.inf
+    for end in ends[:200]:
+        branch, row = [], int(end)
+        while row >= 0:
+            branch.append(row)
+            row = int(tree.parents[row])
+        gaps = np.linalg.norm(positions[branch][:, None] - path.positions[None], axis=2).min(axis=1)
+        if gaps.mean() < least:
+            best, least = branch, float(gaps.mean())
+    gaps = np.linalg.norm(origins[:, None] - positions[best][None], axis=2)
+    return [int(k) for k in np.flatnonzero(gaps.min(axis=1) < 1e-9)]

@@ -1,0 +1,126 @@
+"""What escape trees cost: the trees of shipped scenes, grown again and again.
+
+Times are those of the processor, not of the clock: what else the machine does counts little.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...planner.collision.edge_certificates import tool_work
+from ...planner.escape import escape_tree
+from ...planner.escape.repet import EscapeTree, RepetSettings, escape_path
+from ...planner.geometry import screw
+from ...planner.geometry.pose import PosePath
+from ...planner.geometry.shapes import pack
+from ...planner.imitation.tsia import final_path, guide_index, imitated_path
+from ...planner.jit import kernel
+from ...planner.safety.safety_layer import contact_masks
+from .scene_plan import Planned
+
+LOOPS = 100
+"""Planes that are laid in a compiled loop for one sample."""
+CELLS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class TreeTimes:
+    """The first tree of a scene; times as mean and standard deviation over samples, in ms.
+
+    Attributes:
+        scene: its name.
+        planes: how many were laid.
+        levels: the most planes from a leaf to the root.
+        plane_ms: a plane at the root with its eight children, all edges proven, in a compiled loop.
+        detour_ms: a whole detour, called from Python: where the path is blocked, the tree, the way back.
+        detour_level_ms: the same for each level of the tree.
+        plan_ms: the clock's time of the whole plan of the arm, once.
+    """
+
+    scene: str
+    planes: int
+    levels: int
+    plane_ms: tuple[float, float]
+    detour_ms: tuple[float, float]
+    detour_level_ms: tuple[float, float]
+    plan_ms: float
+
+
+@kernel
+def expand_loop(g, tree, goal, cells, options, state, repeats):
+    """Give the root its children on the way to a goal (1, 8) again and again."""
+    towards = screw.load8(goal, 0)
+    for _ in range(repeats):
+        for k in range(len(cells)):
+            cells[k] = -1.0
+        escape_tree.expand(g, tree, 0, 1, towards, cells, options, options[0], state)
+    return tree[1, 0]
+
+
+def timed_tree(planned: Planned, repeats: int) -> TreeTimes:
+    """Measure the first tree of a scene with so many samples.
+
+    Raises:
+        ValueError: the way is free in the scene.
+    """
+    scene = planned.scene
+    settings = replace(planned.settings.repet, rounds=1, retries=0)
+    path, tool = _nominal(planned), planned.body.tool(planned.arm)
+    names = planned.body.at_tool(planned.arm).names
+    masks = contact_masks(names, scene.obstacles, [pair for pair in scene.allowed if pair[0] in names])
+    tree = escape_path(path, tool, scene.obstacles, settings, masks=masks).tree
+    if tree is None:
+        raise ValueError(f"{scene.name}: the way is free")
+    levels = levels_of(tree)
+    detour = _milliseconds(lambda: escape_path(path, tool, scene.obstacles, settings, masks=masks), repeats)
+    g = tool_work(tool, pack(scene.obstacles), masks=masks, margin=settings.distance)
+    return TreeTimes(
+        scene=scene.name,
+        planes=len(tree.planes),
+        levels=levels,
+        plane_ms=_plane_ms(g, tree, path, settings, repeats),
+        detour_ms=detour,
+        detour_level_ms=(detour[0] / levels, detour[1] / levels),
+        plan_ms=1e3 * planned.plan.seconds,
+    )
+
+
+def _plane_ms(
+    g: np.ndarray, tree: EscapeTree, path: PosePath, settings: RepetSettings, repeats: int
+) -> tuple[float, float]:
+    options, rows = settings.packed(), np.zeros((CELLS, escape_tree.TREE_WIDTH))
+    options[escape_tree.WIDEST], options[escape_tree.RANDOM] = settings.distance, 0.0  # as a first tree has it
+    rows[0, :8] = tree.poses[0]
+    cells, state, goal = np.full(CELLS, -1.0), np.ones(1), np.ascontiguousarray(path.dqs[-1:])
+    mean, deviation = _milliseconds(lambda: expand_loop(g, rows, goal, cells, options, state, LOOPS), repeats)
+    return mean / LOOPS, deviation / LOOPS
+
+
+def _nominal(planned: Planned) -> PosePath:
+    """The final path, which is blocked."""
+    imitated = imitated_path(planned.scene.demonstrated, planned.scene.goal)
+    guide = guide_index(imitated, planned.settings.motion.guide) if len(imitated) > 1 else 0
+    return final_path(planned.arm.fk(planned.start), imitated, guide)
+
+
+def _milliseconds(function: Callable[[], object], repeats: int) -> tuple[float, float]:
+    """Mean and standard deviation of the processor's time of a call [ms]; the first one only loads what is needed."""
+    function()
+    samples = []
+    for _ in range(repeats):
+        start = time.thread_time()
+        function()
+        samples.append(1e3 * (time.thread_time() - start))
+    return float(np.mean(samples)), float(np.std(samples))
+
+
+def levels_of(tree: EscapeTree) -> int:
+    """The most planes on the way from a node to the root."""
+    depth = np.zeros(len(tree.parents), dtype=int)
+    for row, parent in enumerate(tree.parents):
+        depth[row] = 0 if parent < 0 else depth[parent] + 1
+    return int(depth.max())

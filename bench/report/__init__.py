@@ -1,0 +1,1 @@
+"""`onedemo report`: tables and figures of runs."""

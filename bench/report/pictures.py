@@ -1,0 +1,49 @@
+"""The figures of a report, drawn and written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..document.document import Picture, Pictures
+from ..document.untrusted_text import slug
+from ..drawing.figure_style import saved, styled
+from .groups import Group, groups_by_task
+from .outcome_figures import clearance, failures, timing
+from .rate_figures import Series, by_level, by_speed, series_of
+from .read_runs import Run, speeds_of
+
+FOLDER = "figures"
+KINDS = ("success", "speed", "failures", "clearance", "timing")
+"""Beginnings of the files' names, one for each question."""
+
+
+def drawn(run: Run, groups: list[Group], output: Path) -> dict[str, list[Picture]]:
+    """All figures by kind, one per task and robot where there is something to draw; PNG and PDF are written."""
+    speeds = speeds_of(run.suite)
+    draw: dict[str, Callable[[list[Series]], Any]] = {
+        "success": by_level,
+        "speed": lambda lines: by_speed(lines, speeds),
+        "failures": failures,
+        "clearance": clearance,
+        "timing": timing,
+    }
+    found: dict[str, list[Picture]] = {kind: [] for kind in KINDS}
+    with styled():
+        for (task, robot), some in groups_by_task(groups).items():
+            lines = series_of(group for group in some if group.records)
+            title = f"{task}, {robot}"
+            for kind in KINDS if lines else ():
+                figure = draw[kind](lines)
+                if figure is not None:
+                    figure.axes[0].set_title(title)
+                    stem = f"{FOLDER}/{kind}-{slug(task)}-{slug(robot)}"
+                    svg = saved(figure, output / stem)
+                    found[kind].append(Picture(f"{stem}.png", svg.encode(), f"{kind}: {title}"))
+    return found
+
+
+def with_caption(pictures: list[Picture], caption: str) -> list[Pictures]:
+    """One block, or none where there is no picture."""
+    return [Pictures(pictures, caption)] if pictures else []

@@ -1,0 +1,93 @@
+"""What a run says in a few lines: one row of numbers for each cell, and words for the terminal."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from ...configs.grid import RunConfig
+from ..atomic_files import write_whole
+from ..episodes.episode_records import EpisodeRecord
+from ..statistics import median, wilson
+from ..task_table import TASKS
+from .groups import outcome_of
+
+SUMMARY = "summary.json"
+
+
+def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
+    """The numbers of one cell: method, task, robot, level and what came of it; None where there is nothing to tell."""
+    successes = sum(record.success for record in records)
+    low, high = wilson(successes, len(records))
+    error = TASKS[config.task].error
+    worst = [error.factor * max(record.numbers[error.key]) for record in records if record.success]
+    timed = [record for record in records if max(record.tick_us) > 0.0]
+    clearances = [1e3 * record.clearance for record in records if record.clearance is not None]
+    return {
+        "method": config.method,
+        "task": config.task,
+        "robot": config.robot,
+        "level": config.condition,
+        "episodes": len(records),
+        "successes": successes,
+        "safe_successes": sum(record.safe_success for record in records),
+        "wilson_low": round(low, 4),
+        "wilson_high": round(high, 4),
+        **_middle_and_most("seconds", [record.seconds for record in timed]),
+        "error": f"{error.words} [{error.unit}]",
+        **_middle_and_most("error", worst),
+        **_middle_and_most("tick_us", [record.tick_us[0] for record in timed]),
+        "tick_us_p99": _middle([record.tick_us[1] for record in timed]),
+        "tick_us_max": max((record.tick_us[2] for record in timed), default=None),
+        "touching": sum(record.contacts > 0 for record in records),
+        "clearance_mm_min": min(clearances, default=None),
+        "refused": sum(record.refused for record in records),
+        "failures": dict(Counter(outcome_of(record) for record in records if not record.success)),
+    }
+
+
+def _middle(values: list[float]) -> float | None:
+    return median(values) if values else None
+
+
+def _middle_and_most(key: str, values: list[float]) -> dict[str, float | None]:
+    return {f"{key}_median": _middle(values), f"{key}_max": max(values, default=None)}
+
+
+def verdict(row: dict[str, Any]) -> list[str]:
+    """Lines for the terminal and the top of the report."""
+    failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
+    times = f"{_said(row['tick_us_median'], '.0f')} us per tick (median), {_said(row['tick_us_p99'], '.0f')} us (p99)"
+    what, _, unit = row["error"].rpartition(" [")
+    most = row["error_max"]
+    largest = "no success, so no error" if most is None else f"{what} {most:.1f} {unit[:-1]} in the successes"
+    return [
+        f"{row['successes']} of {row['episodes']} succeeded at {row['level']} "
+        f"(Wilson 95 %: {row['wilson_low']:.2f} to {row['wilson_high']:.2f}), "
+        f"{row['safe_successes']} without any unwanted contact",
+        f"{_said(row['seconds_median'])} s simulated per episode (median), {largest}",
+        f"planner {times}; failures: {failures}",
+        *_beside_obstacles(row),
+    ]
+
+
+def _beside_obstacles(row: dict[str, Any]) -> list[str]:
+    """A line about obstacles, if there were any."""
+    if row["clearance_mm_min"] is None and not row["refused"]:
+        return []
+    drawn = row["episodes"] + row["refused"]
+    return [
+        f"obstacles touched in {row['touching']} of {row['episodes']} episodes, smallest distance "
+        f"{_said(row['clearance_mm_min'])} mm; {row['refused']} of {drawn} starts had no room for them"
+    ]
+
+
+def write_summary(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The rows as `{"rows": [...]}`."""
+    write_whole(path, json.dumps({"rows": rows}, indent=2, allow_nan=False) + "\n")
+
+
+def _said(value: float | None, digits: str = ".1f") -> str:
+    return "-" if value is None else f"{value:{digits}}"

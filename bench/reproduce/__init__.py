@@ -1,0 +1,1 @@
+"""`onedemo reproduce`: the paper's experiments."""

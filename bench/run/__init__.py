@@ -1,0 +1,1 @@
+"""`onedemo run`: a comparison in a folder."""

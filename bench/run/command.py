@@ -1,0 +1,100 @@
+"""`onedemo run`: a config in, a run folder out; interrupted runs go on where they stopped."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from ...configs.grid import load_grid
+from ...configs.shipped_files import shipped_config
+from ...planner.errors import BadConfig
+from ..console import console
+from ..episodes.run_folder import LOG, alone, describe, merge, open_folder, parsed_shard, recorded
+from ..episodes.scenarios import read_suite
+from ..interruption import ended
+from ..workers.executors import executor_for
+from .actors_used import with_actors
+from .comparison import Comparison
+from .config_checks import check_grid
+from .episode_jobs import EpisodeJobs
+from .finish import film, report, show
+from .run_progress import Board
+
+SHIPPED_FOLDERS = (".", os.path.join("configs", "bench"))
+
+
+def run_config(
+    config: str,
+    overrides: list[str],
+    output: Path,
+    *,
+    shard: str | None = None,
+    retry: bool = False,
+    quiet: bool = False,
+) -> int:
+    """Run a config and write its folder; returns the exit code.
+
+    Args:
+        config: a file, or the name of a shipped config.
+        overrides: `key=value` changes.
+        output: where the run folder is made.
+        shard: part i of n of the episodes, as "i/n"; None: all of them.
+        retry: run again the episodes that were lost with their workers.
+        quiet: print only the folder, and errors.
+
+    Raises:
+        BadConfig: the config, an override or the demonstration cannot be used.
+        RunBusy: another process writes into the same folder.
+    """
+    source, part = config_path(config), parsed_shard(shard)
+    grid = load_grid(source, overrides)
+    check_grid(grid)
+    grid = with_actors(grid)
+    folder = output / f"{grid.name}-{grid.digest()}"
+    err = console(stderr=True, quiet=quiet)
+
+    def work() -> list[str]:
+        with ExitStack() as held:
+            open_folder(folder, held, part.name)
+            describe(grid, folder, shlex.join(["onedemo", "run", config, *overrides]))
+            return _completed(Comparison(grid, folder, Board(grid, err), part, retry=retry), err)
+
+    return ended(work, folder, "finished episodes", quiet=quiet)
+
+
+def config_path(config: str) -> Path:
+    """The file itself, or the shipped config of that name, also for a path as it stands in the source tree."""
+    path = Path(config)
+    if path.exists():
+        return path
+    if path.suffix in ("", ".yaml") and str(path.parent) in SHIPPED_FOLDERS:
+        return shipped_config(path.stem)
+    raise BadConfig(path, "", "no such file")
+
+
+def _completed(comparison: Comparison, err: Any) -> list[str]:
+    """Run what is missing, and report if nothing is; the lines for the terminal."""
+    grid, folder, shard = comparison.grid, comparison.folder, comparison.shard
+    episodes = sum(cell.episodes for cell in grid.cells)
+    with executor_for(grid.settings, EpisodeJobs, episodes, folder / LOG) as executor:
+        comparison.complete(executor)
+        suite = read_suite(folder)
+        assert suite
+        # other parts may have been finished meanwhile
+        records, _ = recorded(folder, grid.cells, suite)
+        missing = sum(len(suite.feasible(cell)) for cell in grid.cells) - len(records)
+        if missing:
+            return [f"part {shard.index} of {shard.count} is done; {missing} episodes of other parts are missing"]
+        with alone(folder, "pictures"):
+            if len(grid.cells) == 1:
+                with err.status("drawing the first episode"):
+                    show(executor, grid, folder)
+            if grid.cells[0].video:
+                with err.status("recording failures"):
+                    film(executor, grid, folder, records.values())
+    merge(folder, records.values(), list(grid.cells))
+    with err.status("drawing the report"):
+        return report(folder)

@@ -1,0 +1,123 @@
+"""What can be said of a config before anything is built: names, demonstrations, arguments and settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from inspect import signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...baselines.own_policy import is_own
+from ...configs.grid import Grid
+from ...configs.run_config import RunConfig
+from ...planner.errors import BadConfig, BadDemonstration
+from ..task_table import TASKS
+
+if TYPE_CHECKING:
+    from ...planner.imitation.demonstration import Demonstration
+
+OWN_KEYS = ("robot", "level", "obstacles", "render_mode")
+"""Arguments of environments that are keys of a config themselves."""
+
+
+def check_grid(grid: Grid) -> None:
+    """Refuse what cannot be run.
+
+    Raises:
+        BadConfig: an unknown name, argument or setting; with the file, or the command line, and the key.
+        BadDemonstration: a demonstration is of something else.
+        UnknownName: no such demonstration is shipped.
+    """
+    known = known_names()
+    conditions = [("defaults", default.when) for default in grid.settings.defaults]
+    conditions += [("exclude", condition) for condition in grid.settings.exclude]
+    for where, condition in conditions:
+        for key, wanted in condition.items():
+            for value in wanted if isinstance(wanted, list) else [wanted]:
+                check_name(grid.blame(where), key, value, known)
+    for cell in grid.cells:
+        for key in known:
+            check_name(grid.blame(key), key, getattr(cell, key), known)
+        _check_arguments(cell, grid)
+        _check_settings(cell, grid)
+    for cell in {(cell.task, cell.demonstration): cell for cell in grid.cells}.values():
+        fitting_demonstration(cell)
+
+
+def known_names() -> dict[str, Iterable[str | None]]:
+    """For the keys whose values are names, the known ones."""
+    from ...baselines.factory import POLICIES
+    from ...envs.core.levels import LEVELS, OBSTACLES
+    from ...envs.scene.robots import ROBOTS
+
+    return {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
+
+
+def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterable[str | None]]) -> None:
+    if key == "method" and isinstance(value, str) and is_own(value):
+        return
+    if key in known and value not in list(known[key]):
+        raise BadConfig(source, key, f"unknown {key} {value!r}; known: {', '.join(map(str, known[key]))}")
+
+
+def _check_arguments(cell: RunConfig, grid: Grid) -> None:
+    check_env(cell, grid.blame("env"))
+
+
+def check_env(cell: RunConfig, source: str | Path) -> None:
+    """Refuse arguments that the environment does not know."""
+    import gymnasium as gym
+    from gymnasium.envs.registration import load_env_creator
+
+    from ... import envs  # noqa: F401  (registers the ids)
+
+    if not cell.env:
+        return
+    name = TASKS[cell.task].id
+    creator = load_env_creator(str(gym.spec(name).entry_point))
+    known = [key for key in signature(creator).parameters if key not in OWN_KEYS]
+    for key in cell.env:
+        if key not in known:
+            reason = f"{name} has no such argument; allowed: {', '.join(known) or 'none'}"
+            raise BadConfig(source, f"env.{key}", reason)
+
+
+def _check_settings(cell: RunConfig, grid: Grid) -> None:
+    """Refuse settings that the method does not know, and another frame of the hand for what is no method of ours."""
+    from ...baselines.factory import OWN_TOOL, settings_of
+
+    if is_own(cell.method):
+        if cell.tool is not None:
+            raise BadConfig(grid.blame("tool"), "tool", f"{cell.method} {OWN_TOOL}")
+        return
+    try:
+        settings_of(cell.method, cell.settings)
+    except BadConfig as error:
+        key = f"settings.{error.key}" if error.key else "settings"
+        reason = f"{error.reason} (of the method {cell.method!r})"
+        raise BadConfig(grid.blame("settings"), key, reason) from None
+
+
+def fitting_demonstration(cell: RunConfig) -> Demonstration:
+    """The demonstration of a cell.
+
+    Raises:
+        BadDemonstration: it cannot be read, or is of something else.
+        UnknownName: no such demonstration is shipped.
+    """
+    from ...baselines.screw_policy import PROGRAMS
+    from ...configs.shipped_files import demonstration_path
+    from ...planner.imitation.demonstration_files import load_demonstration
+
+    file = demonstration_path(cell.demonstration)
+    demonstration = load_demonstration(file)
+    task, segments = TASKS[cell.task].shown or cell.task, PROGRAMS[cell.task].SEGMENTS
+    if demonstration.task != task:
+        raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
+    names = [segment.name for segment in demonstration.segments]
+    for name in segments:
+        if name not in names:
+            there = ", ".join(names) or "none"
+            reason = f"{name!r} is missing; {task!r} needs {', '.join(segments)}, there are: {there}"
+            raise BadDemonstration(file, "segment_names", reason)
+    return demonstration

@@ -1,0 +1,271 @@
+"""What a worker does: it keeps environments and policies, and runs in them what it is asked for.
+
+A job and its answer are mappings that JSON can hold, so that any process may do the work:
+
+| job | besides "cell" | answer |
+|---|---|---|
+| "prepare" | | {} |
+| "draw" | "indices" | "drawn": per index a start, or why there is none |
+| "episode" | "index", "start", "scenario", "trajectories" (a folder or null) | "record" |
+| "show" | "folder" | what `show` returns |
+| "film" | "folder", "record" | "problem": why there is no video of it, or "" |
+
+What the user got wrong, or must know, is answered by {"refused": text, "key": key}.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+import warnings
+from collections import OrderedDict
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...configs.run_config import RunConfig
+from ...planner.errors import BadConfig, BadOption, NoRoom, OneDemoError
+from ...planner.geometry.pose import Pose
+from ..episodes.episode_records import EpisodeRecord, known_record
+from ..episodes.run_folder import FIGURE, VIDEO
+from ..episodes.scenarios import Scenario, ScenarioChanged, scenarios_of
+from ..method_table import WITHOUT_DEMONSTRATION
+from ..task_table import TASKS
+from ..workers.dispatcher import ERROR, Answer, Job
+from ..workers.worker_process import main
+
+if TYPE_CHECKING:
+    from ...baselines.policy import Policy
+
+LOG = logging.getLogger("onedemo")
+MAX_ENVIRONMENTS, MAX_POLICIES = 4, 32
+"""What a worker keeps."""
+
+
+class EpisodeJobs:
+    """Does the jobs of real runs."""
+
+    def __init__(self) -> None:
+        self._environments: OrderedDict[str, Any] = OrderedDict()
+        self._policies: OrderedDict[str, Policy] = OrderedDict()
+
+    def do(self, job: Job) -> Answer:
+        """The answer to a job."""
+        config = RunConfig.model_validate(job["cell"])
+        try:
+            env, policy = self.prepared(config)
+            if job["kind"] == "draw":
+                return {"drawn": [draw(env, config, index) for index in job["indices"]]}
+            if job["kind"] == "episode":
+                return {"record": asdict(episode(env, policy, config, job))}
+            if job["kind"] == "show":
+                return shown(policy, config, Path(job["folder"]))
+            if job["kind"] == "film":
+                return {"problem": filmed(policy, config, known_record(job["record"]), Path(job["folder"]))}
+            return {}
+        except OneDemoError as error:
+            return refusal(error)
+
+    def prepared(self, config: RunConfig) -> tuple[Any, Policy]:
+        """The environment and the policy of a cell, compiled and warm, from the ones that are kept if possible.
+
+        Raises:
+            BadConfig: the config names something wrongly; with its key.
+            BadDemonstration: the demonstration is of something else.
+        """
+        place = environment_key(config)
+        if place not in self._environments:
+            self._environments[place] = made(config)
+            for _ in range(len(self._environments) - MAX_ENVIRONMENTS):
+                self._environments.popitem(last=False)[1].close()
+        self._environments.move_to_end(place)
+        env, own = self._environments[place], f"{place} {config.digest()}"
+        if own not in self._policies:
+            self._policies[own] = policy_for(env, config)
+            for _ in range(len(self._policies) - MAX_POLICIES):
+                self._policies.popitem(last=False)
+        self._policies.move_to_end(own)
+        return env, self._policies[own]
+
+    def close(self) -> None:
+        """Close all environments."""
+        for env in self._environments.values():
+            env.close()
+        self._environments.clear()
+        self._policies.clear()
+
+
+def refusal(error: OneDemoError) -> Answer:
+    """What the user got wrong, with the key of the config if one is to blame."""
+    if isinstance(error, BadOption):
+        return {"refused": error.reason, "key": error.option}
+    return {"refused": str(error), "key": ""}
+
+
+def environment_key(config: RunConfig) -> str:
+    """What environments differ in; the level is given to `reset`."""
+    return repr((config.task, config.robot, config.obstacles, sorted(config.env.items()), config.max_seconds))
+
+
+def action_limit(config: RunConfig) -> int:
+    """The time limit of an episode in actions."""
+    from ...envs import IDS
+
+    kind = IDS[TASKS[config.task].id]
+    seconds = kind.seconds if config.max_seconds is None else config.max_seconds
+    # what is no frequency is refused by the environment
+    rate = config.env.get("control_frequency", kind.frequency)
+    return max(1, round(seconds * rate)) if isinstance(rate, int) else kind.steps
+
+
+def made(config: RunConfig, render_mode: str | None = None) -> Any:
+    """The environment of a config."""
+    import gymnasium as gym
+
+    from ... import envs  # noqa: F401  (registers the ids)
+    from ...baselines.warm_up import warm_up_for
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        env: Any = gym.make(
+            TASKS[config.task].id,
+            robot=config.robot,
+            level=config.level,
+            obstacles=config.obstacles,
+            render_mode=render_mode,
+            max_episode_steps=action_limit(config),
+            **config.env,
+        )
+    warm_up_for(env.unwrapped.task)
+    return env
+
+
+def policy_for(env: Any, config: RunConfig) -> Policy:
+    """The policy of a config for its environment."""
+    from ...baselines.factory import make_policy
+    from .config_checks import fitting_demonstration
+
+    shown, tool = fitting_demonstration(config), None
+    if config.tool is not None:
+        *position, turn = config.tool
+        tool = Pose.from_yaw(position, math.radians(turn))
+    return make_policy(config.method, env.unwrapped.task, shown, config.settings, key_poses=config.key_poses, tool=tool)
+
+
+def draw(env: Any, config: RunConfig, index: int) -> Answer:
+    """A start of a cell, with how often one was refused; or why there is none."""
+    from ..episodes.start_states import drawn_start
+
+    scenario = scenarios_of(config)[index]
+    try:
+        observation, info = env.reset(seed=scenario.seed, options={"level": scenario.level})
+    except NoRoom as error:
+        return {"infeasible": error.reason}
+    return {"start": drawn_start(env, observation), "refused": int(info["layouts_refused"])}
+
+
+def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRecord:
+    """The record of an episode; what the policy raises is a failure of its own.
+
+    Raises:
+        ScenarioChanged: the environment draws another start than the frozen one.
+        BadConfig: the start cannot be drawn.
+    """
+    from ..episodes.episode import judged, play
+    from ..episodes.start_states import check_start, drawn_start
+
+    scenario, started, checked = scenarios_of(config)[job["index"]], time.perf_counter(), False
+
+    def observer(env: Any, observation: Any) -> None:
+        nonlocal checked
+        if not checked:
+            checked = True
+            check_start(scenario, job["start"], drawn_start(env, observation))
+
+    kept = Path(job["trajectories"]) if job.get("trajectories") else None
+    try:
+        played = play(env, policy, scenario, observer)
+    except ScenarioChanged:
+        raise
+    except Exception as error:
+        if not checked:
+            raise BadConfig("config.yaml", "", f"scenario {scenario.index} cannot be drawn: {error}") from None
+        LOG.info("%s, seed %d", config.method, scenario.seed, exc_info=True)
+        detail = f"{type(error).__name__}: {error}"
+        record = lost_record(config, scenario, ERROR, detail, time.perf_counter() - started)
+    else:
+        record = judged(env, played, scenario, config, kept)
+    return replace(record, cell=config.digest(), scenario=job["scenario"])
+
+
+def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str, seconds: float) -> EpisodeRecord:
+    """What is written of an episode that the simulator could not judge: a failure, not known to be safe."""
+    return EpisodeRecord(
+        index=scenario.index,
+        seed=scenario.seed,
+        method=config.method,
+        task=config.task,
+        robot=config.robot,
+        level=config.level,
+        success=False,
+        safe=False,
+        stage="",
+        failure_reason=reason,
+        detail=" ".join(detail.split())[:300],
+        collision="",
+        seconds=0.0,
+        contacts=0,
+        clearance=None,
+        refused=0,
+        numbers={},
+        wall_seconds=seconds,
+        tick_us=[0.0, 0.0, 0.0, 0.0],
+        cell=config.digest(),
+    )
+
+
+def shown(policy: Policy, config: RunConfig, folder: Path) -> Answer:
+    """Draw the first scenario; what a report must know of the pictures, or why there is no figure."""
+    try:
+        return show(policy, config, folder)
+    except Exception as error:
+        LOG.info("no figure", exc_info=True)
+        return {"video": config.video, "figure_problem": f"{type(error).__name__}: {error}"}
+
+
+def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
+    """Figure and, if wanted, video of the first scenario in a folder; what a report must know of them."""
+    from ..episodes.episode_figure import draw_episode
+    from ..episodes.first_episode import watch
+
+    figure, video = folder / FIGURE, folder / VIDEO
+    env = made(config, "rgb_array" if config.video else None)
+    try:
+        seen = watch(env, policy, scenarios_of(config)[0], config, video if config.video else None)
+    finally:
+        env.close()
+    among = "" if config.obstacles in (None, "none") else f", obstacles {config.obstacles}"
+    where = f"{config.task}, {config.robot}, {config.condition}{among}"
+    shown = "no demonstration" if config.method in WITHOUT_DEMONSTRATION else "one demonstration"
+    title = f"{where}, seed {config.seed}: {shown}, {config.method}"
+    draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])
+    return {"speed": seen.speed, "video": config.video, "video_problem": seen.video_problem}
+
+
+def filmed(policy: Policy, config: RunConfig, record: EpisodeRecord, folder: Path) -> str:
+    """Record an episode once more into a run folder; "" or why there is no video."""
+    from ..episodes.failure_videos import record_video
+
+    env = made(config, "rgb_array")
+    try:
+        return record_video(env, policy, record, config, folder)
+    except Exception as error:
+        LOG.info("no video", exc_info=True)
+        return f"{type(error).__name__}: {error}"
+    finally:
+        env.close()
+
+
+if __name__ == "__main__":
+    main(EpisodeJobs())

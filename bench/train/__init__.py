@@ -1,0 +1,1 @@
+"""`onedemo train`: learners on a task."""

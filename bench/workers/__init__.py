@@ -1,0 +1,1 @@
+"""Jobs on processes that may die."""

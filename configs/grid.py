@@ -1,0 +1,211 @@
+"""A comparison: the cells that one config file stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..planner.errors import BadConfig
+from .dotted_keys import MISSING, at, having, leaves, merged, without
+from .run_config import CELL_KEYS, LATER, RUN_KEYS, Default, RunConfig, RunSettings, digest_of, reason_of, unknown_key
+from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
+
+MAX_CELLS = 10_000
+ALLOWED = (*CELL_KEYS, *RUN_KEYS)
+FIXED = ("name", "video", "trajectories")
+"""Keys that are the same in all cells."""
+NAMING = ("task", "robot", "level", "method")
+"""Keys that a cell is called by."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """All cells of a run.
+
+    Attributes:
+        source: the file.
+        changed: keys that the command line changed.
+        written: what the file holds, with these changes.
+        settings: how the cells are made and run.
+        cells: in order.
+    """
+
+    source: Path
+    changed: tuple[str, ...]
+    written: dict[str, Any]
+    settings: RunSettings
+    cells: tuple[RunConfig, ...]
+
+    @property
+    def name(self) -> str:
+        """First part of the run folder's name."""
+        return self.cells[0].name
+
+    def digest(self) -> str:
+        """Twelve hexadecimal digits of all that decides what is in the table."""
+        return digest_of([self.name, [[cell.digest(), cell.episodes] for cell in self.cells]])
+
+    def label(self, cell: RunConfig) -> str:
+        """What a cell is, in words: task, robot, level, method, and what else is swept."""
+        values = cell.model_dump(mode="json")
+        more = [key for key in self.settings.sweep if key not in NAMING]
+        found = {key: at(values, key) for key in more}
+        named = [f"{key}={_worded(value)}" for key, value in found.items() if not (value is MISSING and key in LATER)]
+        return " ".join([*(values[key] for key in NAMING), *named])
+
+    def blame(self, key: str) -> str | Path:
+        """Where a key was written: the command line or the file."""
+        return _blame(self.source, self.changed, key)
+
+
+def load_grid(path: str | Path, overrides: list[str] | None = None) -> Grid:
+    """A config file with `key=value` changes, checked; a change of a swept key takes the place of its values.
+
+    Raises:
+        BadConfig: naming the file, or the command line, and the key, and what is allowed.
+    """
+    changes = overrides or []
+    changed = tuple(text.partition("=")[0] for text in changes)
+    values = load_mapping(path)
+    if isinstance(values.get("sweep"), dict):
+        values["sweep"] = _unfolded(values["sweep"], path)
+    values = with_overrides(values, changes)
+    if isinstance(values.get("sweep"), dict):
+        for key in changed:
+            values["sweep"] = without(values["sweep"], key)
+        values["sweep"] = dict(leaves(values["sweep"]))
+    for key in values:
+        if key not in ALLOWED:
+            raise BadConfig(_blame(path, changed, str(key)), str(key), unknown_key(str(key), ALLOWED))
+    settings = _settings(values, path, changed)
+    base = {key: value for key, value in values.items() if key in CELL_KEYS}
+    return Grid(Path(path), changed, values, settings, _cells(base, settings, path, changed))
+
+
+def load_config(path: str | Path, overrides: list[str] | None = None) -> RunConfig:
+    """The only cell of a config file with `key=value` changes, checked.
+
+    Raises:
+        BadConfig: naming the file, or the command line, and the key, and what is allowed.
+    """
+    cells = load_grid(path, overrides).cells
+    if len(cells) != 1:
+        raise BadConfig(path, "sweep", f"gives {len(cells)} cells; a single one is expected")
+    return cells[0]
+
+
+def _blame(path: str | Path, changed: tuple[str, ...], key: str) -> str | Path:
+    first = key.split(".")[0]
+    return COMMAND_LINE if first in {text.split(".")[0] for text in changed} else path
+
+
+def _unfolded(sweep: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
+    """A sweep with nested mappings for keys with dots, so that changes find them."""
+    result: dict[str, Any] = {}
+    for key, values in leaves(sweep):
+        if at(result, key) is not MISSING:
+            raise BadConfig(path, f"sweep.{key}", "is there twice")
+        result = having(result, key, values)
+    return result
+
+
+def _settings(values: dict[str, Any], path: str | Path, changed: tuple[str, ...]) -> RunSettings:
+    """The keys besides those of a cell, and whether what they speak of are keys of a cell."""
+    try:
+        settings = RunSettings.model_validate({key: values[key] for key in RUN_KEYS if key in values})
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        allowed = tuple(Default.model_fields) if key.startswith("defaults") else RUN_KEYS
+        raise BadConfig(_blame(path, changed, key), key, reason_of(first, allowed)) from None
+    for key, choices in settings.sweep.items():
+        _check_cell_key(path, changed, f"sweep.{key}", key)
+        if any(choices[k] in choices[:k] for k in range(len(choices))):
+            raise BadConfig(_blame(path, changed, "sweep"), f"sweep.{key}", f"holds a value twice: {choices}")
+        if at(values, key) is not MISSING:
+            raise BadConfig(_blame(path, changed, key), key, "has a value, but is swept too: write one or the other")
+    conditions = [(f"exclude.{k}", condition) for k, condition in enumerate(settings.exclude)]
+    for k, default in enumerate(settings.defaults):
+        conditions.append((f"defaults.{k}.when", default.when))
+        for key in default.set:
+            _check_cell_key(path, changed, f"defaults.{k}.set.{key}", key)
+    for where, condition in conditions:
+        for key in condition:
+            _check_cell_key(path, changed, f"{where}.{key}", key)
+    if settings.address is not None and settings.executor != "ray":
+        where = _blame(path, changed, "address")
+        raise BadConfig(where, "address", f"is only for executor: ray, which is {settings.executor!r}")
+    return settings
+
+
+def _check_cell_key(path: str | Path, changed: tuple[str, ...], where: str, key: str) -> None:
+    allowed = tuple(each for each in CELL_KEYS if each not in FIXED)
+    if key.split(".")[0] not in allowed:
+        raise BadConfig(_blame(path, changed, where), where, unknown_key(key, allowed))
+
+
+def _cells(
+    base: dict[str, Any], settings: RunSettings, path: str | Path, changed: tuple[str, ...]
+) -> tuple[RunConfig, ...]:
+    count = prod(len(values) for values in settings.sweep.values())
+    if count > MAX_CELLS:
+        raise BadConfig(path, "sweep", f"gives {count} cells; at most {MAX_CELLS} are possible")
+    cells, used = {}, [False] * len(settings.exclude)
+    for choice in product(*settings.sweep.values()):
+        chosen = dict(zip(settings.sweep, choice, strict=True))
+        values = base
+        for key, value in chosen.items():
+            values = having(values, key, value)
+        hits = [_matches(values, condition) for condition in settings.exclude]
+        used = [before or hit for before, hit in zip(used, hits, strict=True)]
+        if any(hits):
+            continue
+        weak: dict[str, Any] = {}
+        for default in settings.defaults:
+            if _matches(values, default.when):
+                weak = merged(weak, default.set)
+        cell = _cell(merged(weak, values), chosen, path, changed)
+        if cell.digest() in cells:
+            raise BadConfig(path, "sweep", f"gives the same cell twice: {_combination(chosen)}")
+        cells[cell.digest()] = cell
+    # a change on the command line may well leave nothing to exclude
+    if not all(used) and not changed:
+        raise BadConfig(path, f"exclude.{used.index(False)}", "leaves out nothing: no combination has these values")
+    if not cells:
+        raise BadConfig(path, "exclude", "leaves nothing to run")
+    return tuple(cells.values())
+
+
+def _cell(values: dict[str, Any], chosen: dict[str, Any], path: str | Path, changed: tuple[str, ...]) -> RunConfig:
+    try:
+        return RunConfig.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        cell = f" (in the cell {_combination(chosen)})" if chosen else ""
+        raise BadConfig(_blame(path, changed, key), key, reason_of(first, ALLOWED) + cell) from None
+
+
+def _matches(values: Mapping[str, Any], condition: Mapping[str, Any]) -> bool:
+    """Whether a cell has the values, or one of those listed; keys that are not written have their default."""
+    for key, wanted in condition.items():
+        value = at(values, key)
+        if value is MISSING and key in RunConfig.model_fields:
+            value = RunConfig.model_fields[key].get_default(call_default_factory=True)
+        if value not in (wanted if isinstance(wanted, list) else [wanted]):
+            return False
+    return True
+
+
+def _combination(chosen: Mapping[str, Any]) -> str:
+    return " ".join(f"{key}={value}" for key, value in chosen.items())
+
+
+def _worded(value: Any) -> str:
+    return "default" if value is MISSING else str(value)

@@ -1,0 +1,181 @@
+"""What a scene file may hold: the table of its keys. `scene` makes the planner's objects of it."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from ..planner.log.log_json import SIZES
+
+TAGS = ("~text", "~list", "~table")
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[float], Field(min_length=4, max_length=4)]
+PoseVector = Annotated[list[float], Field(min_length=7, max_length=7)]
+
+
+def _refused(key: str, text: str) -> PydanticCustomError:
+    return PydanticCustomError("refused", "{text}", {"key": key, "text": text})
+
+
+def _form(value: Any) -> str:
+    return "~text" if isinstance(value, str) else "~list" if isinstance(value, list) else "~table"
+
+
+def _either(text: str) -> Discriminator:
+    return Discriminator(_form, custom_error_type="form", custom_error_message=f"must be {text}")
+
+
+class Strict(BaseModel):
+    """A table without unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _know_every_key(cls, values: Any) -> Any:
+        allowed = list(cls.model_fields)
+        for key in values if isinstance(values, dict) else ():
+            if key not in allowed:
+                close = get_close_matches(str(key), allowed, n=1)
+                hint = f"did you mean {close[0]!r}? " if close else ""
+                raise _refused(str(key), f"unknown key; {hint}allowed: {', '.join(allowed)}")
+        return values
+
+
+class Placed(Strict):
+    """A pose.
+
+    Attributes:
+        position: (3,) [m].
+        quaternion: wxyz.
+        rpy_degrees: roll, pitch and yaw about the fixed axes x, y and z, in that order; [180, 0, yaw] points down.
+        yaw_degrees: upright, turned about z.
+    """
+
+    position: Point
+    quaternion: Quaternion | None = None
+    rpy_degrees: Point | None = None
+    yaw_degrees: float | None = None
+
+    @model_validator(mode="after")
+    def _one_attitude(self) -> Placed:
+        given = [key for key in ("quaternion", "rpy_degrees", "yaw_degrees") if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise _refused(given[1], f"cannot stand beside {given[0]!r}: one of them is enough")
+        return self
+
+
+class Solid(Strict):
+    """A shape: radius for a sphere, radius and length for capsule and cylinder, size for a box, vertices for a mesh."""
+
+    shape: Literal["sphere", "capsule", "box", "cylinder", "mesh"]
+    radius: float | None = None
+    length: float | None = None
+    size: Point | None = None
+    vertices: list[Point] | None = None
+
+    @model_validator(mode="after")
+    def _its_own_sizes(self) -> Solid:
+        wanted = SIZES[self.shape]
+        for key in ("radius", "length", "size", "vertices"):
+            if key in wanted and getattr(self, key) is None:
+                raise _refused(key, f"is missing; a {self.shape} has {' and '.join(wanted)}")
+            if key not in wanted and getattr(self, key) is not None:
+                raise _refused(key, f"a {self.shape} has none; it has {' and '.join(wanted)}")
+        return self
+
+
+class ObstacleItem(Solid, Placed):
+    """An obstacle: a shape, where it is, and what else the planner's `Obstacle` has."""
+
+    velocity: Point = [0.0, 0.0, 0.0]
+    margin: float | None = None
+    name: str = ""
+
+
+class HeldItem(Solid):
+    """An object in the hand."""
+
+    name: str = "held"
+    tcp_from_object: Placed
+
+
+class UrdfRobot(Strict):
+    """An arm from a file; the root link stands at the origin unless `base` says where."""
+
+    urdf: str
+    tcp_frame: str
+    velocity_limits: list[float] | None = None
+    base: Placed | None = None
+
+
+class Recorded(Strict):
+    """A recorded demonstration: a shipped name or a file, all of it or one segment."""
+
+    file: str
+    segment: str | None = None
+
+
+class SceneConfig(Strict):
+    """One leg to plan.
+
+    Attributes:
+        title: for pictures.
+        robot: robosuite's name, or a URDF file.
+        demonstration: a recording, or pose vectors (x y z [m], then quaternion wxyz) joined by screw motions.
+        start: joints [rad or m], or "home".
+        goal: of the tcp; a pose vector or a table.
+        obstacles: shapes in the world.
+        held: what is in the hand.
+        allowed: pairs of a part of the body (or a held object) and an obstacle that may touch.
+        settings: of the planner, nested; see `PlanSettings`.
+        seed: of the planner's random choices.
+    """
+
+    title: str = ""
+    robot: Annotated[
+        Annotated[str, Tag("~text")] | Annotated[UrdfRobot, Tag("~table")],
+        _either("a robot's name, or a table of urdf and tcp_frame"),
+    ] = "Panda"
+    demonstration: Annotated[
+        Annotated[Annotated[list[PoseVector], Field(min_length=1)], Tag("~list")] | Annotated[Recorded, Tag("~table")],
+        _either("a list of pose vectors, or a table of file and segment"),
+    ]
+    start: Annotated[
+        Annotated[Literal["home"], Tag("~text")] | Annotated[list[float], Tag("~list")],
+        _either("a list of joints, or home"),
+    ] = "home"
+    goal: Annotated[
+        Annotated[PoseVector, Tag("~list")] | Annotated[Placed, Tag("~table")],
+        _either("a pose vector, or a table of position and attitude"),
+    ]
+    obstacles: list[ObstacleItem] = Field(default_factory=list)
+    held: HeldItem | None = None
+    allowed: list[Annotated[list[str], Field(min_length=2, max_length=2)]] = Field(default_factory=list)
+    settings: dict[str, Any] = Field(default_factory=dict)
+    seed: Annotated[int, Field(ge=0, le=2**31)] = 0
+
+
+def checked(values: dict[str, Any]) -> SceneConfig | tuple[str, str]:
+    """The config, or the key of the first mistake and what is wrong there."""
+    try:
+        return SceneConfig.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+    context = first.get("ctx", {})
+    parts = [part for part in first["loc"] if part not in TAGS]
+    if first["type"] == "refused":
+        return _key([*parts, context["key"]]), context["text"]
+    if first["type"] == "missing":
+        return _key(parts), "is missing"
+    got = repr(first["input"])
+    got = got if len(got) <= 60 else f"{got[:57]}..."
+    return _key(parts), f"{first['msg'][0].lower()}{first['msg'][1:]}, got {got}"
+
+
+def _key(parts: list[Any]) -> str:
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
+    return text.removeprefix(".")

@@ -1,0 +1,311 @@
+"""What all tasks share: the Gymnasium interface around a simulation."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
+
+import gymnasium as gym
+import numpy as np
+
+from ...planner.errors import BadAction, BadOption, NoRoom, UnknownName
+from ...planner.geometry.pose import Pose
+from ...planner.geometry.shapes import Obstacle as Solid
+from ..scene.robot_description import robot_parts
+from ..scene.scene import OBSTACLE
+from ..scene.scene_objects import TABLE_HEIGHT, Things
+from ..simulation.moving_obstacles import Intruder
+from ..simulation.render import TABLE_VIEW, Ghost, Renderer, View
+from ..simulation.simulation import PHYSICS_DT, Simulation, Start
+from ..simulation.state import State
+from ..simulation.twist_control import TwistDrive
+from . import spaces as space
+from .description import TaskDescription, TaskFurniture, TaskObject
+from .levels import checked_obstacles, level_named
+from .obstacle_placement import Leg, Order, Stage, placed
+from .progress import Progress
+
+CONTROL_MODES = ("joint_velocity", "ee_twist")
+REWARDS = ("sparse", "dense")
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
+SLOTS = 3
+"""Obstacles that there can be at once."""
+MAX_LAYOUTS = 40
+"""Starts that are drawn before a place for the obstacles must have been found."""
+Observation = dict[str, np.ndarray]
+Judged = TypeVar("Judged", bound=Progress)
+"""What keeps the progress of a task."""
+
+
+def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
+    """The value if it is among the known ones.
+
+    Raises:
+        UnknownName: it is not.
+    """
+    if not isinstance(value, str) or value not in known:
+        raise UnknownName(option, value, known)
+    return value
+
+
+class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
+    """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator.
+
+    Args:
+        name: of the task.
+        goals: how many goal poses there are.
+        motions: largest motion index.
+        more: entries of the observation that only this task has.
+        things: what there is besides the robot.
+        view: where the camera is.
+
+    The others are those of every environment, see their docstrings.
+    """
+
+    _goal_pose: np.ndarray
+    _progress: Judged
+
+    metadata = METADATA
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        robot: str,
+        things: Things,
+        goals: int,
+        motions: int,
+        level: str,
+        obstacles: str | None,
+        control_mode: str,
+        reward: str,
+        render_mode: str | None,
+        control_frequency: int,
+        arms: tuple[str, ...] | None = None,
+        view: View = TABLE_VIEW,
+        more: dict[str, gym.spaces.Box] | None = None,
+    ):
+        level_named(level)
+        self.level, self.obstacles = level, None if obstacles is None else checked_obstacles(obstacles, SLOTS)
+        self.control_mode = checked_choice("control_mode", control_mode, CONTROL_MODES)
+        self.reward_kind = checked_choice("reward", reward, REWARDS)
+        if render_mode is not None:
+            checked_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        self.render_mode = render_mode
+        self.substeps = _substeps(control_frequency)
+        self.sim = Simulation(robot, replace(things, obstacles=SLOTS), arms)
+        self.arms = tuple(index.arm for index in self.sim.scene.arms)
+        self.metadata = {**METADATA, "render_fps": control_frequency}
+        entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
+        self.action_space = space.action_space(entries, len(self.arms))
+        self._drive = TwistDrive(self.sim, self.control_dt)
+        self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
+        self._action = np.zeros(self.action_space.shape or ())
+        self._renderer: Renderer | None = None
+        self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
+        self._task = self._described(name, robot, things)
+        widths, objects = self._task.gripper_width, len(things.objects)
+        self.observation_space = space.observation_space(
+            self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
+        )
+
+    def _described(self, name: str, robot: str, things: Things) -> TaskDescription:
+        parts = robot_parts(robot, self.sim.scene)
+        return TaskDescription(
+            name=name,
+            robot=robot,
+            arms=self.arms,
+            control_dt=self.control_dt,
+            objects=tuple(TaskObject.of(each) for each in things.objects),
+            bodies=parts.bodies,
+            table_height=TABLE_HEIGHT,
+            fixtures=parts.fixtures,
+            gripper_width=tuple(self.sim.widest_opening(k) for k in range(len(self.arms))),
+            furniture=tuple(TaskFurniture.of(each) for each in things.furniture),
+            touching=parts.touching,
+            obstacles=SLOTS,
+            control_mode=self.control_mode,
+        )
+
+    @property
+    def task(self) -> TaskDescription:
+        """What every policy may know beforehand."""
+        return self._task
+
+    @property
+    def control_dt(self) -> float:
+        """Seconds between actions."""
+        return self.substeps * PHYSICS_DT
+
+    @abstractmethod
+    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+        """Where things are in a new episode, obstacles aside; sets `_goal_pose`, `_progress` and the task's own state.
+
+        Args:
+            options: those of `reset`, but for "level" and "obstacles"; unknown keys are refused.
+            layout: name of the ranges to draw from.
+            spacious: there will be obstacles, which need room.
+        """
+
+    @abstractmethod
+    def _legs(self, start: Start) -> list[Leg]:
+        """The motions of the hand that obstacles are put in the way of, in order."""
+
+    def _ghosts(self) -> list[Ghost]:
+        """What is drawn but not there: the goals, if they are places of objects."""
+        return []
+
+    def _paper(self, legs: list[Leg]) -> list[Order]:
+        """The paper's obstacles."""
+        raise BadOption("obstacles", f"the paper shows no obstacle in {self.task.name}")
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode; the same seed and options give the same bits."""
+        super().reset(seed=seed)
+        self._steps = self._contacts = 0
+        self._action[:] = 0.0
+        self._drive.reset()
+        self.sim.reset(self._started(dict(options or {})))
+        observation, *_, info = self._reached()
+        return observation, info
+
+    def _started(self, options: dict[str, Any]) -> Start:
+        """A start with its obstacles; starts beside which none has room are drawn anew."""
+        level = level_named(options.pop("level", self.level))
+        wanted = level.obstacles if self.obstacles is None else self.obstacles
+        wanted = checked_obstacles(options.pop("obstacles", wanted), SLOTS)
+        self._refused = 0
+        for _ in range(MAX_LAYOUTS):
+            start = self._start(dict(options), level.layout, isinstance(wanted, str) and wanted != "none")
+            intruders = wanted if isinstance(wanted, tuple) else self._intruders(wanted, start)
+            if intruders is not None:
+                return start._replace(intruders=intruders)
+            self._refused += 1
+        raise NoRoom(wanted)
+
+    def _intruders(self, kind: str, start: Start) -> tuple[Intruder, ...] | None:
+        if kind == "none":
+            return ()
+        task, legs = self.task, self._legs(start)
+        things = []
+        for each, pose in zip(task.objects, start.objects, strict=True):
+            things.append(Solid(each.shape, Pose.from_vector(pose), name=each.name))
+        for each, pose in zip(task.furniture, start.furniture, strict=True):
+            things += each.at(Pose.from_vector(pose))
+        solids = [*task.fixtures, *things]
+        stage = Stage(legs, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height)
+        return placed(self.np_random, kind, stage, self._paper(legs) if kind == "paper" else None)
+
+    def _reached(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """What Gymnasium wants to know of the state that the simulation is in."""
+        state = self.sim.read()
+        reward, terminated, info = self._judge(state)
+        if self.sim.obstacles.intruders:
+            touching = state.touching
+            self._contacts += bool(touching[OBSTACLE].any() or touching[:, OBSTACLE].any())
+        info["n_contacts"], info["min_obstacle_distance"] = self._contacts, self.sim.nearest_obstacle()
+        info["layouts_refused"] = self._refused
+        if self.render_mode == "human":
+            self._show()
+        return self._observation(state), reward, terminated, False, info
+
+    def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
+        """Reward, terminated and info of the state just reached."""
+        progress = self._progress
+        verdict = progress.update(state)
+        if verdict.unwanted:
+            progress.collision = self.sim.contact_name((verdict.low, verdict.high))
+        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
+        return reward, progress.success or progress.failed, progress.info()
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Act for one control step.
+
+        Raises:
+            BadAction: not an array of real numbers, of the wrong shape, or not finite.
+        """
+        self._take(action)
+        if self.sim.obstacles.intruders:
+            self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self._progress.motion_index)
+        if self.control_mode == "joint_velocity":
+            bad = self.sim.step(self._action, self._speed_limits, 1.0, self.substeps)
+        else:
+            bad = self._step_twists()
+        if bad >= 0:
+            raise BadAction(f"entry {bad} is not finite")
+        self._steps += 1
+        return self._reached()
+
+    def render(self) -> np.ndarray | None:
+        """An image (height, width, 3) uint8 in the mode "rgb_array"; OpenGL is opened by the first call."""
+        if self.render_mode != "rgb_array":
+            return None
+        return self._opened_renderer().image(self.sim.data, self._ghosts())
+
+    def close(self) -> None:
+        """Close the window or the image buffer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _show(self) -> None:
+        self._opened_renderer().show(self.sim.data)
+
+    def _opened_renderer(self) -> Renderer:
+        if self._renderer is None:
+            self._renderer = Renderer(self.sim.model, self._view)
+        return self._renderer
+
+    def _take(self, action: np.ndarray) -> None:
+        """Copy an action, of whatever array type, to where the compiled code reads it."""
+        if type(action) is not np.ndarray or action.dtype != np.float64:
+            try:
+                action = np.asarray(action)
+            except ValueError:
+                raise BadAction("is not an array of numbers") from None
+            if action.dtype.kind not in "fiub":
+                raise BadAction(f"is not an array of real numbers, but of {action.dtype.name}")
+        if action.shape != self._action.shape:
+            raise BadAction(f"has shape {action.shape}; expected {self._action.shape}")
+        self._action[:] = action
+
+    def _step_twists(self) -> int:
+        """Step with tcp twists in world axes."""
+        finite = np.isfinite(self._action)
+        if not finite.all():
+            return int(np.argmin(finite))
+        rows = np.clip(self._action, -1.0, 1.0).reshape(len(self.arms), -1)
+        commands = np.column_stack([self._drive.commands(rows), rows[:, -1]])
+        return self.sim.step(commands.ravel(), np.ones_like(self._speed_limits), math.inf, self.substeps)
+
+    def _observation(self, state: State) -> Observation:
+        return {
+            "joint_positions": state.joint_positions,
+            "joint_velocities": state.joint_velocities,
+            "tcp_pose": state.tcp_pose,
+            "gripper_opening": state.gripper_opening,
+            "object_pose": state.object_pose,
+            "goal_pose": self._goal_pose.copy(),
+            "motion_index": np.array([self._progress.motion_index]),
+            **self.sim.obstacles.observed(self._steps * self.control_dt),
+            **self._more_observed(state),
+        }
+
+    def _more_observed(self, state: State) -> Observation:
+        """Entries of the observation that only some tasks have."""
+        return {}
+
+
+def _substeps(control_frequency: int) -> int:
+    physics = round(1.0 / PHYSICS_DT)
+    if isinstance(control_frequency, bool) or not isinstance(control_frequency, int) or control_frequency <= 0:
+        raise BadOption("control_frequency", f"{control_frequency!r} is not a positive whole number of Hz")
+    if physics % control_frequency:
+        allowed = ", ".join(str(rate) for rate in range(10, physics + 1) if physics % rate == 0)
+        reason = f"{control_frequency} Hz does not divide {physics} Hz; allowed: {allowed}"
+        raise BadOption("control_frequency", reason)
+    return physics // control_frequency

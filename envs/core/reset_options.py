@@ -1,0 +1,65 @@
+"""Checks of what a caller gives to `reset(options=...)`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ...planner.errors import BadOption, UnknownName
+from ...planner.robot.arm import Arm
+
+
+def check_known(options: Iterable[str], known: tuple[str, ...]) -> None:
+    """Refuse reset options that a task does not have.
+
+    Raises:
+        UnknownName: one is not among the known ones.
+    """
+    for key in options:
+        if key not in known:
+            raise UnknownName("reset option", key, known)
+
+
+def checked_array(option: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """The value as a finite float64 array of a shape.
+
+    Raises:
+        BadOption: it is not.
+    """
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise BadOption(option, f"is not an array of numbers of shape {shape}") from None
+    if array.shape != shape:
+        raise BadOption(option, f"has shape {array.shape}; expected {shape}")
+    if not np.isfinite(array).all():
+        index = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise BadOption(option, f"holds a value that is not finite at index {index}")
+    return array
+
+
+def checked_poses(option: str, value: Any, count: int) -> np.ndarray:
+    """Poses (count, 7) with unit quaternions."""
+    poses = checked_array(option, value, (count, 7))
+    norms = np.linalg.norm(poses[:, 3:], axis=1)
+    if (np.abs(norms - 1.0) > 1e-3).any():
+        worst = int(np.abs(norms - 1.0).argmax())
+        raise BadOption(option, f"quaternion {worst} has norm {norms[worst]:.6g}; expected 1")
+    poses[:, 3:] /= norms[:, None]
+    return poses
+
+
+def checked_joints(value: Any, arms: tuple[Arm, ...]) -> np.ndarray:
+    """Joints (n_arms, dof) within the limits; for one arm (dof,) does too."""
+    shape = (len(arms), arms[0].dof)
+    flat = np.ndim(value) == 1 and len(arms) == 1
+    joints = checked_array("joint_positions", [value] if flat else value, shape)
+    for arm, q in zip(arms, joints, strict=True):
+        outside = np.flatnonzero((q < arm.lower) | (q > arm.upper))
+        if len(outside):
+            k = int(outside[0])
+            limits = f"[{arm.lower[k]:.4g}, {arm.upper[k]:.4g}]"
+            raise BadOption("joint_positions", f"{arm.joint_names[k]} = {q[k]:.4g} is outside {limits}")
+    return joints

@@ -1,0 +1,83 @@
+"""Observation and action spaces: bounded float64 boxes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from ...planner.robot.arm import Arm
+
+REACH = 3.0
+"""Bound of world coordinates [m]; what leaves it has long fallen off the table."""
+JOINT_SLACK = 0.1
+"""A soft joint limit gives way by less than this [rad]."""
+LARGEST_OBSTACLE, FASTEST_OBSTACLE = 1.0, 2.0
+"""Bounds of an obstacle's extents [m] and speed [m/s]."""
+LOOSE = 1.5
+"""Bound of the gap between the pads by the widest: fingers on linkages give way when the hand is swung."""
+MAX_SPEED = 20.0
+"""Bound of measured joint speeds [rad/s]; the servos command at most 3."""
+
+
+def box(low: np.ndarray | float, high: np.ndarray | float, shape: tuple[int, ...]) -> spaces.Box:
+    """A float64 box of a shape, from numbers or arrays that broadcast to it."""
+    return spaces.Box(
+        np.broadcast_to(np.asarray(low, dtype=np.float64), shape).copy(),
+        np.broadcast_to(np.asarray(high, dtype=np.float64), shape).copy(),
+        dtype=np.float64,
+    )
+
+
+def pose_box(count: int) -> spaces.Box:
+    """Poses (count, 7): x y z [m] and wxyz."""
+    bound = np.array([REACH] * 3 + [1.0] * 4)
+    return box(-bound, bound, (count, 7))
+
+
+def observation_space(
+    arms: tuple[Arm, ...],
+    gripper_width: tuple[float, ...],
+    objects: int,
+    goals: int,
+    motions: int,
+    obstacles: int,
+    **more: spaces.Box,
+) -> spaces.Space[Any]:
+    """The observation of a task; its entries are described in the environment's docstring.
+
+    Args:
+        arms: their joints.
+        gripper_width: widest gaps [m].
+        objects: number of free objects.
+        goals: number of goals.
+        motions: largest motion index.
+        obstacles: number of slots.
+        more: entries of this task alone.
+    """
+    shape = (len(arms), arms[0].dof)
+    lower = np.stack([arm.lower for arm in arms]) - JOINT_SLACK
+    upper = np.stack([arm.upper for arm in arms]) + JOINT_SLACK
+    return spaces.Dict(
+        {
+            "joint_positions": box(lower, upper, shape),
+            "joint_velocities": box(-MAX_SPEED, MAX_SPEED, shape),
+            "tcp_pose": pose_box(len(arms)),
+            "gripper_opening": box(0.0, LOOSE * np.array(gripper_width), (len(arms),)),
+            "object_pose": pose_box(objects),
+            "goal_pose": pose_box(goals),
+            "motion_index": box(0.0, float(motions), (1,)),
+            "obstacle_active": box(0.0, 1.0, (obstacles,)),
+            "obstacle_shape": box(0.0, 3.0, (obstacles,)),
+            "obstacle_size": box(0.0, LARGEST_OBSTACLE, (obstacles, 3)),
+            "obstacle_pose": pose_box(obstacles),
+            "obstacle_velocity": box(-FASTEST_OBSTACLE, FASTEST_OBSTACLE, (obstacles, 3)),
+            **more,
+        }
+    )
+
+
+def action_space(entries_per_arm: int, arms: int) -> spaces.Box:
+    """Normalized actions: per arm the entries of the control mode, then its gripper."""
+    return box(-1.0, 1.0, (arms * (entries_per_arm + 1),))

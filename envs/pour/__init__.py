@@ -1,0 +1,1 @@
+"""Pouring beads, with one arm or two."""

@@ -1,0 +1,113 @@
+"""Where the glasses stand at the start of an episode of pouring: levels as data, seeded, independent of any method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...planner.errors import BadOption
+from ..core.reset_options import checked_array
+from ..scene.scene_objects import TABLE_HEIGHT
+
+LOWEST, HIGHEST = 0.10, 0.40
+"""Of stands' tops above the table [m]."""
+GAP, LONG_GAP = 0.20, 0.30
+"""Least distance of the glasses' axes [m]: a hand has room between them; and one with an obstacle beside it."""
+CLOSEST = 0.11
+"""Of the axes of two stands that are not inside each other [m]."""
+NEAREST, FARTHEST = 0.35, 0.72
+"""Of a glass's axis from the arm's base axis [m]: what an arm reaches with a level hand."""
+TABLE_EDGE = 0.35
+"""Largest |x| and |y| of a glass's axis on the table [m]."""
+MAX_TRIES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """How far a start may differ from the nominal one.
+
+    Attributes:
+        source: largest shift in x and in y of the source [m].
+        target: largest shift in x and in y of the target [m].
+        height: range of the shift of a stand's height [m].
+        joints: largest change of a start joint [rad].
+    """
+
+    source: float
+    target: float
+    height: tuple[float, float]
+    joints: float
+
+
+RANGES = {
+    "L0": Ranges(0.0, 0.0, (0.0, 0.0), 0.0),
+    "L1": Ranges(0.05, 0.10, (0.0, 0.0), 0.05),
+    "L2": Ranges(0.15, 0.20, (-0.05, 0.15), 0.15),
+}
+"""By the name of a layout, see `levels`. A round glass looks the same from everywhere: there is no yaw to draw."""
+
+
+def pour_layout(
+    rng: np.random.Generator,
+    ranges: Ranges,
+    nominal: np.ndarray,
+    arm_axis: np.ndarray,
+    gap: float,
+) -> np.ndarray:
+    """Tops (2, 3) of the stands [m] by rejection: independent of any method.
+
+    Args:
+        rng: source of randomness.
+        ranges: how far they may differ from the nominal ones.
+        nominal: (2, 3) tops [m].
+        arm_axis: (2,) x, y of the arm's base axis [m].
+        gap: least distance of the glasses [m].
+
+    Raises:
+        BadOption: none was found in a bounded number of tries.
+    """
+    reach = np.array([[ranges.source], [ranges.target]])
+    for _ in range(MAX_TRIES):
+        tops = np.array(nominal)
+        tops[:, :2] += rng.uniform(-reach, reach, (2, 2))
+        tops[:, 2] += rng.uniform(*ranges.height, 2)
+        if fits(tops, arm_axis, gap):
+            return tops
+    raise BadOption("stands", "near the nominal places there is none where both glasses can stand")
+
+
+def fits(tops: np.ndarray, arm_axis: np.ndarray, gap: float) -> bool:
+    """Stands (2, 3) keep their distances to each other, to the table's edge and to the arm's axis."""
+    reach = np.linalg.norm(tops[:, :2] - arm_axis, axis=1)
+    return bool(
+        (reach >= NEAREST).all()
+        and (reach <= FARTHEST).all()
+        and (np.abs(tops[:, :2]) <= TABLE_EDGE).all()
+        and np.linalg.norm(tops[0, :2] - tops[1, :2]) >= gap
+    )
+
+
+def checked_stands(value: Any, arm_axis: np.ndarray) -> np.ndarray:
+    """Tops (2, 3) of stands that a caller wants.
+
+    Raises:
+        BadOption: not numbers of that shape, off the table, inside each other or out of reach.
+    """
+    tops = checked_array("stands", value, (2, 3))
+    for name, top in zip(("source", "target"), tops, strict=True):
+        place = f"that of the {name} at {np.round(top, 3).tolist()}"
+        if np.abs(top[:2]).max() > TABLE_EDGE:
+            raise BadOption("stands", f"{place} is not on the table, |x| and |y| <= {TABLE_EDGE}")
+        if not LOWEST - 1e-9 <= top[2] - TABLE_HEIGHT <= HIGHEST + 1e-9:
+            low, high = TABLE_HEIGHT + LOWEST, TABLE_HEIGHT + HIGHEST
+            raise BadOption("stands", f"{place} is not {low:g} to {high:g} m high")
+        reach = float(np.linalg.norm(top[:2] - arm_axis))
+        if not NEAREST <= reach <= FARTHEST:
+            limits = f"{NEAREST} to {FARTHEST} m"
+            raise BadOption("stands", f"{place} is {reach:.2f} m from the arm's base axis; {limits} is in reach")
+    apart = float(np.linalg.norm(tops[0, :2] - tops[1, :2]))
+    if apart < CLOSEST:
+        raise BadOption("stands", f"they are {apart:.2f} m apart, inside each other; at least {CLOSEST} m is needed")
+    return tops

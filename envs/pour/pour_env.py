@@ -1,0 +1,236 @@
+"""Pouring beads from one glass into another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...planner.control.inverse_kinematics import inverse_kinematics
+from ...planner.errors import BadOption
+from ...planner.geometry.pose import Pose
+from ...planner.geometry.shapes import Obstacle, pack
+from ..core import spaces as space
+from ..core.environment import OneDemoEnv
+from ..core.obstacle_placement import Leg
+from ..core.reset_options import check_known, checked_joints
+from ..scene.beads import poured_into
+from ..scene.body_clearance import arm_room
+from ..scene.robots import places_of, robot_named
+from ..scene.scene_objects import Things
+from ..simulation.render import View
+from ..simulation.simulation import Start
+from ..simulation.state import State
+from .geometry import BACK, BEADS, GLASSES, SOURCE, STANDS, TARGET, TILTED, UP, grasp, pouring, tcp_from_glass
+from .layout import GAP, LONG_GAP, RANGES, checked_stands, pour_layout
+from .places import POUR_PLACES
+from .rules import PourProgress
+
+OPTIONS = ("level", "obstacles", "stands", "joint_positions")
+RAISED, ABOVE = 0.12, (0.0, 0.04, 0.08)
+"""Heights [m] above the grasp: of a leg's beginning, and at which the hand must find room beside obstacles."""
+START_ROOM = 0.03
+"""Least distance [m] of the arm at the start to the glasses and stands that it does not hold."""
+TURNS = np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0))
+"""By how much a hand that holds the source from the start may be turned from the ready one, the first that fits."""
+MARGIN = 0.1
+"""Least distance of a joint to its limit [rad] where the source is in the hand from the start."""
+MAX_STARTS = 200
+VIEW = View((-0.14, -0.02, 1.06), 1.42, 150.0, -17.0)
+
+
+class PourEnv(OneDemoEnv[PourProgress]):
+    """Pour the beads of one glass into another with one arm.
+
+    ## Description
+    Two glasses stand on stands on a table: the source (60 mm wide, 100 mm high, 80 g; 46 mm wide where a gripper holds
+    or clears no wider one), which holds 30 beads of 12 mm and 1 g that stand for water, and the target (86 mm wide, as
+    high). The source must be fetched, carried and emptied into the target. It is held by friction between the fingers
+    only, beads fall because they are heavy. Success is judged from the simulator: at least 90 % of the beads in the
+    target, at most 5 % outside both glasses, the target upright and at rest, for half a second.
+
+    ## Action Space
+    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+
+    | control mode | entry | meaning |
+    |---|---|---|
+    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
+    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
+    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
+    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+
+    ## Observation Space
+    A `Dict` of float64 boxes. Poses are `x y z [m]`, then quaternion wxyz. A glass's frame is in the middle of its
+    axis, z up; a stand's is in the middle of its top.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | `joint_positions` | (1, 7) | [rad] |
+    | `joint_velocities` | (1, 7) | [rad/s] |
+    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `gripper_opening` | (1,) | gap between the finger pads [m] |
+    | `object_pose` | (2, 7) | source and target |
+    | `goal_pose` | (1, 7) | the middle of the target's rim at the start; constant during an episode |
+    | `furniture_pose` | (2, 7) | the stands of source and target; constant during an episode |
+    | `bead_fraction` | (3,) | share of the beads in the source, in the target, outside both |
+    | `motion_index` | (1,) | 0 while the source is to be fetched, 1 while it is held, 2 while enough is poured |
+    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
+    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
+    | `obstacle_pose` | (3, 7) | the obstacles |
+    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+
+    ## Rewards
+    `reward="dense"`: in [0, 1], half of it the share of the beads in the target, the other half for reaching,
+    holding and carrying the source, kept once beads are poured; 1 with success. `reward="sparse"`: 1 with success.
+
+    ## Starting State
+    By `level`: L0 the robot's nominal places; L1 the source moved by up to 5 cm and the target by up to 10 cm in x and
+    y, start joints by up to 0.05 rad; L2 by 15 cm, 20 cm and 0.15 rad, each stand 10 to 30 cm high instead of 15. The
+    glasses' axes are at least 20 cm apart and 0.35 to 0.72 m from the arm's base axis, the arm at least 3 cm from
+    everything. There is no yaw to draw: a round glass looks the same from everywhere. With `pregrasped=True` the
+    fingers are closed round the source where it stands.
+
+    L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way of the source from its
+    stand to the target, L4 one that swings across it at up to 0.3 m/s or appears in the middle of the carry, F a
+    still one where the forearm passes. R, S and T start as L1 does. Obstacles are solid; they overlap what hand and
+    glass sweep on the straight way, and leave room at the start, at the grasp and at the pouring.
+
+    ## Episode End
+    `terminated` with a settled success, when a glass has fallen off the table, or when more than 5 % of the beads lie
+    on the table or below. `truncated` after 40 s (Gymnasium's `TimeLimit`).
+
+    ## Info
+    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
+    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
+    what it holds), `layouts_refused` (starts that had no room for the obstacles), `fraction_in_target`,
+    `fraction_outside`, `carry_tilt` [rad] (largest tilt of the lifted source before its rim came within 15 cm of the
+    target's axis) and `beads_lost` (most beads outside both glasses until then).
+
+    ## Arguments
+    `robot="Panda"` (others: `onedemo.envs.pour.places.POUR_PLACES`; of Baxter the right arm), `pregrasped=False`,
+    `stands=None` or (2, 3) nominal x, y, z [m] of the stands' tops, source first, `ready=None` or (7,) nominal start
+    joints [rad], `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" |
+    "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
+    `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles`
+    (a kind, or a list of `Intruder`), `stands` (2, 3) exact tops of the stands, and `joint_positions` (7,).
+
+    ## Version History
+    * v0: first version.
+    """
+
+    def __init__(
+        self,
+        robot: str = "Panda",
+        pregrasped: bool = False,
+        stands: Any = None,
+        ready: Any = None,
+        level: str = "L1",
+        obstacles: str | None = None,
+        control_mode: str = "joint_velocity",
+        reward: str = "sparse",
+        control_frequency: int = 50,
+        render_mode: str | None = None,
+    ):
+        if not isinstance(pregrasped, bool):
+            raise BadOption("pregrasped", f"{pregrasped!r} is neither True nor False")
+        places = places_of(POUR_PLACES, robot, "pour")
+        robot_named(robot).check_grip(2.0 * places.source.radius, robot, "the source")
+        self._glasses = (places.source, GLASSES[TARGET])
+        super().__init__(
+            name="pour",
+            robot=robot,
+            things=Things(self._glasses, STANDS, BEADS),
+            goals=1,
+            motions=2,
+            level=level,
+            obstacles=obstacles,
+            control_mode=control_mode,
+            reward=reward,
+            render_mode=render_mode,
+            control_frequency=control_frequency,
+            view=VIEW,
+            more={"furniture_pose": space.pose_box(2), "bead_fraction": space.box(0.0, 1.0, (3,))},
+        )
+        self.pregrasped = pregrasped
+        self._nominal = checked_stands(places.stands if stands is None else stands, self._axis)
+        self._ready = checked_joints(places.ready if ready is None else ready, self.arms)
+        self._place(self._nominal)
+
+    @property
+    def _axis(self) -> np.ndarray:
+        return self.arms[0].chain[0, 4:6]
+
+    def _place(self, stands: np.ndarray) -> np.ndarray:
+        """Take the tops (2, 3) of the stands; the poses (2, 7) of the glasses on them."""
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+        heights = np.array([[0.0, 0.0, glass.height] for glass in self._glasses])
+        self._furniture = np.column_stack([stands, upright])
+        self._goal_pose = np.append(stands[TARGET] + heights[TARGET], upright[0])[None]
+        glasses = np.column_stack([stands + 0.5 * heights, upright])
+        sizes = np.array([[glass.radius, glass.height] for glass in self._glasses])
+        self._progress = PourProgress(glasses, sizes, BEADS.count, self.control_dt)
+        return glasses
+
+    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+        check_known(options, OPTIONS)
+        given = checked_stands(options["stands"], self._axis) if "stands" in options else None
+        wanted = checked_joints(options["joint_positions"], self.arms) if "joint_positions" in options else None
+        ranges = RANGES[layout]
+        gap = LONG_GAP if spacious and ranges.source else GAP
+        for _ in range(MAX_STARTS):
+            tops = pour_layout(self.np_random, ranges, self._nominal, self._axis, gap) if given is None else given
+            offsets = self.np_random.uniform(-ranges.joints, ranges.joints, self._ready.shape)
+            joints = self._joints(tops, offsets) if wanted is None else wanted
+            if joints is not None and (given is not None or wanted is not None or self._is_clear(tops, joints)):
+                return self._started_at(tops, joints)
+        raise BadOption("stands", "the hand cannot be at the source, or not clear of the glasses, at the start")
+
+    def _started_at(self, tops: np.ndarray, joints: np.ndarray) -> Start:
+        glasses = self._place(tops)
+        beads = poured_into(glasses[SOURCE], self._glasses[SOURCE], BEADS)
+        grips = np.array([2.0 * self._glasses[SOURCE].radius]) if self.pregrasped else None
+        return Start(joints, glasses, self._furniture.copy(), beads, grips=grips)
+
+    def _joints(self, tops: np.ndarray, offsets: np.ndarray) -> np.ndarray | None:
+        """Start joints (1, dof): near the ready ones, or those that hold the source; None if nothing does."""
+        arm = self.arms[0]
+        if not self.pregrasped:
+            return np.clip(self._ready + offsets, arm.lower, arm.upper)
+        center = tops[SOURCE] + [0.0, 0.0, 0.5 * self._glasses[SOURCE].height]
+        approach = arm.fk(self._ready[0]).rotation[:2, 2]
+        yaw = np.arctan2(approach[1], approach[0])
+        for turn in TURNS:
+            q = inverse_kinematics(arm, grasp(self._glasses[SOURCE], center, yaw + turn), self._ready[0])
+            if q is not None and arm.margin(q) >= MARGIN:
+                return q[None]
+        return None
+
+    def _is_clear(self, tops: np.ndarray, joints: np.ndarray) -> bool:
+        """Whether the arm keeps its distance from what it does not hold."""
+        solids = []
+        for k in range(int(self.pregrasped), 2):
+            at = Pose.from_position_quaternion(tops[k])
+            top = Pose.from_position_quaternion([0.0, 0.0, 0.5 * self._glasses[k].height])
+            solids += [*self._task.furniture[k].at(at), Obstacle(self._glasses[k].shape, at @ top)]
+        return arm_room(self.arms[0], self._task.bodies[0], joints[0], pack(solids)) >= START_ROOM
+
+    def _legs(self, start: Start) -> list[Leg]:
+        """The carry: from above the source's stand to before the target, turned with the arm."""
+        glass, rim, center = self._glasses[SOURCE], self._goal_pose[0, :3], start.objects[SOURCE, :3]
+        hand = grasp(glass, center, self._yaw_at(center, SOURCE))
+        yaw = self._yaw_at(rim, TARGET)
+        above = [Pose.from_position_quaternion([0.0, 0.0, up]) @ hand for up in (*ABOVE, RAISED)]
+        before, after = pouring(glass, rim, yaw, 0.0, BACK, UP), pouring(glass, rim, yaw, TILTED)
+        keys = tuple((pose,) for pose in (*above[:-1], before, after))
+        return [Leg(above[-1], before, keys, glass.shape, tcp_from_glass(glass), motion=1)]
+
+    def _yaw_at(self, place: np.ndarray, glass: int) -> float:
+        """Direction [rad] of a level hand: the ready one's, turned about the arm's base as the glass's place is."""
+        approach = self.arms[0].fk(self._ready[0]).rotation[:2, 2]
+        was, now = self._nominal[glass, :2] - self._axis, place[:2] - self._axis
+        turned = np.arctan2(now[1], now[0]) - np.arctan2(was[1], was[0])
+        return float(np.arctan2(approach[1], approach[0]) + turned)
+
+    def _more_observed(self, state: State) -> dict[str, np.ndarray]:
+        return {"furniture_pose": self._furniture.copy(), "bead_fraction": self._progress.fractions}

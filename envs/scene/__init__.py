@@ -1,0 +1,1 @@
+"""What is there: robots, objects and fixtures, compiled once."""

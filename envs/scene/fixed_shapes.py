@@ -1,0 +1,65 @@
+"""The solid geoms of a model that never move, as shapes in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+
+from ...planner.geometry.pose import Pose
+from ...planner.geometry.shapes import MAX_VERTICES, Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere, hull_corners
+
+PREFIX = "robot0_"
+"""robosuite's, of whatever belongs to the robot."""
+SPECK = 0.005
+"""Balls and boxes smaller than this [m] are left out: some models hold a place with one."""
+
+
+def static_shapes(model: mujoco.MjModel, geoms: Iterable[int]) -> tuple[Obstacle, ...]:
+    """Those of some geoms that are solid and fixed to the world; planes and specks left out.
+
+    A mesh becomes its convex hull, which is what MuJoCo collides with, its corners thinned to what a shape may have.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = []
+    for geom in geoms:
+        solid = model.geom_contype[geom] or model.geom_conaffinity[geom]
+        if solid and model.body_weldid[model.geom_bodyid[geom]] == 0:
+            shape = _shape(model, int(geom))
+            if shape is not None:
+                matrix = np.eye(4)
+                matrix[:3, :3], matrix[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+                name = model.body(model.geom_bodyid[geom]).name.removeprefix(PREFIX)
+                found.append(Obstacle(shape, Pose.from_matrix(matrix), name=name))
+    return tuple(found)
+
+
+def _shape(model: mujoco.MjModel, geom: int) -> Shape | None:
+    """The shape of a geom by MuJoCo's half sizes; None for planes and specks."""
+    known, kind = mujoco.mjtGeom, int(model.geom_type[geom])
+    x, y, z = (float(size) for size in model.geom_size[geom])
+    if kind == known.mjGEOM_MESH:
+        return Mesh(_corners(model, int(model.geom_dataid[geom])))
+    if kind == known.mjGEOM_PLANE or max(x, y, z) < SPECK:
+        return None
+    if kind == known.mjGEOM_BOX:
+        return Box((2.0 * x, 2.0 * y, 2.0 * z))
+    if kind == known.mjGEOM_CYLINDER:
+        return Cylinder(x, 2.0 * y)
+    return Sphere(x) if kind == known.mjGEOM_SPHERE else Capsule(x, 2.0 * y)
+
+
+def _corners(model: mujoco.MjModel, mesh: int) -> np.ndarray:
+    """Corners (n, 3) [m] of a mesh's hull; of too many those that stick out farthest in evenly spread directions."""
+    first = int(model.mesh_vertadr[mesh])
+    points = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
+    corners = points[hull_corners(points)]
+    if len(corners) <= MAX_VERTICES:
+        return corners
+    k = np.arange(MAX_VERTICES)
+    height, turn = 1.0 - (2.0 * k + 1.0) / MAX_VERTICES, k * np.pi * (3.0 - np.sqrt(5.0))
+    around = np.sqrt(1.0 - height**2)
+    directions = np.column_stack([around * np.cos(turn), around * np.sin(turn), height])
+    return corners[np.unique(np.argmax(corners @ directions.T, axis=0))]

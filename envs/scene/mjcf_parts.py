@@ -1,0 +1,132 @@
+"""Things as elements of MuJoCo's XML. Collision geoms are in group 0, what is seen in group 1.
+
+Where robosuite compiles, only group 0 has mass; see `table_model`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from xml.etree.ElementTree import Element, SubElement
+
+from .scene_objects import Beads, Book, Color, Furniture, Glass, Solid, half_sizes
+
+FRICTION = "1.0 0.005 0.0001"
+"""Sliding, torsional, rolling."""
+STAVES = 12
+"""Boxes that make the wall of a glass."""
+BEAD_SOLREF = "0.005 1"
+"""Time constant [s] and damping of a bead's contacts: with MuJoCo's 20 ms, falling beads sink through a 3 mm wall."""
+OBSTACLE_COLOR: Color = (0.86, 0.24, 0.16, 1.0)
+PAPER: Color = (0.95, 0.92, 0.84, 1.0)
+COVER = 0.0025
+"""Thickness of a book's cover [m], and how far it stands out over the paper."""
+TITLE = (0.18, 0.62)
+"""Where a book's title is on its spine: from and to, in parts of its height."""
+PARKED = "0 0 -3"
+"""Where an obstacle is that is not there."""
+
+
+def _text(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def _geom(body: Element, kind: str, size: Iterable[float], color: Color, **more: str) -> None:
+    """A solid geom and its visible twin."""
+    shared = {"type": kind, "size": _text(size)}
+    place = {key: more.pop(key) for key in ("pos", "quat") if key in more}
+    SubElement(body, "geom", {**shared, **place, "group": "0", "rgba": "0 0 0 0", "friction": FRICTION, **more})
+    _seen(body, kind, size, color, **place)
+
+
+def _seen(body: Element, kind: str, size: Iterable[float], color: Color, **place: str) -> None:
+    """A geom that is seen and not felt."""
+    unfelt = {"group": "1", "contype": "0", "conaffinity": "0", "mass": "0"}
+    SubElement(body, "geom", {"type": kind, "size": _text(size), "rgba": _text(color), **place, **unfelt})
+
+
+def _free(name: str) -> Element:
+    body = Element("body", {"name": name})
+    SubElement(body, "joint", {"name": f"{name}_joint", "type": "free", "damping": "0.0005"})
+    return body
+
+
+def solid_body(solid: Solid) -> Element:
+    """A free body of one shape."""
+    body = _free(solid.name)
+    kind, size = half_sizes(solid.shape)
+    _geom(body, kind, size, solid.color, density=f"{solid.density}", condim=f"{solid.condim}")
+    return body
+
+
+def glass_body(glass: Glass) -> Element:
+    """A cup of staves on a disc; the staves start above the disc, so that they never touch what it stands on."""
+    body = _free(glass.name)
+    middle = glass.radius - 0.5 * glass.wall
+    width = glass.radius * math.tan(math.pi / STAVES)
+    tall = 0.5 * (glass.height - glass.wall)
+    stave_mass = f"{0.8 * glass.mass / STAVES}"
+    for k in range(STAVES):
+        angle = 2.0 * math.pi * (k + 0.5) / STAVES
+        place = {
+            "pos": _text((middle * math.cos(angle), middle * math.sin(angle), 0.5 * glass.wall)),
+            "quat": _text((math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))),
+        }
+        _geom(body, "box", (0.5 * glass.wall, width, tall), glass.color, mass=stave_mass, condim="4", **place)
+    bottom = _text((0.0, 0.0, 0.5 * (glass.wall - glass.height)))
+    disc = (glass.radius, 0.5 * glass.wall)
+    _geom(body, "cylinder", disc, glass.color, mass=f"{0.2 * glass.mass}", condim="4", pos=bottom)
+    return body
+
+
+def book_body(book: Book) -> Element:
+    """A box that looks like two boards and a spine around paper, with a band for its title."""
+    body = _free(book.name)
+    x, y, z = (0.5 * size for size in book.size)
+    solid = {"type": "box", "size": _text((x, y, z)), "group": "0", "rgba": "0 0 0 0", "friction": FRICTION}
+    SubElement(body, "geom", {**solid, "density": f"{book.density}", "condim": "4"})
+    for side in (-1.0, 1.0):
+        board = _text((0.0, side * (y - 0.5 * COVER), 0.0))
+        _seen(body, "box", (x, 0.5 * COVER, z), book.color, pos=board)
+    _seen(body, "box", (0.5 * COVER, y, z), book.color, pos=_text((0.5 * COVER - x, 0.0, 0.0)))
+    _seen(body, "box", (x - COVER, y - COVER, z - COVER), PAPER)
+    low, high = (z * (2.0 * part - 1.0) for part in TITLE)
+    title = (1e-4, 0.72 * y, 0.5 * (high - low))
+    _seen(body, "box", title, PAPER, pos=_text((-x, 0.0, 0.5 * (low + high))))
+    return body
+
+
+def bead_bodies(beads: Beads) -> list[Element]:
+    """Balls on three sliding joints each, without friction.
+
+    MuJoCo takes the larger friction of a pair unless a geom has priority: without it the beads stick to the glass.
+    """
+    bodies = []
+    for k in range(beads.count):
+        body = Element("body", {"name": f"bead{k}"})
+        for axis in ("1 0 0", "0 1 0", "0 0 1"):
+            SubElement(body, "joint", {"type": "slide", "axis": axis, "damping": "0.0001"})
+        solid = {"condim": "1", "priority": "1", "mass": f"{beads.mass}", "solref": BEAD_SOLREF}
+        _geom(body, "sphere", (beads.radius,), beads.color, **solid)
+        bodies.append(body)
+    return bodies
+
+
+def furniture_body(furniture: Furniture) -> Element:
+    """Furniture, moved by MuJoCo's mocap between episodes."""
+    body = Element("body", {"name": furniture.name, "mocap": "true"})
+    for part in furniture.parts:
+        kind, size = half_sizes(part.shape)
+        _geom(body, kind, size, part.color, pos=_text(part.place[:3]), quat=_text(part.place[3:]))
+    return body
+
+
+def obstacle_bodies(count: int) -> list[Element]:
+    """Bodies whose shape is set at run time; parked until then."""
+    bodies = []
+    for k in range(count):
+        body = Element("body", {"name": f"obstacle{k}", "mocap": "true", "pos": PARKED})
+        # contact is switched on and off at run time, which works only for bodies compiled with it
+        _geom(body, "sphere", (0.01, 0.01, 0.01), OBSTACLE_COLOR)
+        bodies.append(body)
+    return bodies

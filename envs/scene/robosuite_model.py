@@ -1,0 +1,103 @@
+"""The model of a robot at a table with things, built with robosuite: the only file that touches it.
+
+robosuite's own controllers cost six times the physics and track a path badly; here every arm joint is MuJoCo's
+integrated-velocity servo: the control is a joint speed, its integral is held by a stiff position servo against
+gravity-free links.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import robosuite
+from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
+from robosuite.models.arenas import TableArena
+from robosuite.models.objects import BoxObject
+from robosuite.models.tasks import ManipulationTask
+from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
+from robosuite.utils.mjcf_utils import CustomMaterial
+
+from .baxter_trunk import slice_trunk
+from .mjcf_parts import bead_bodies, book_body, furniture_body, glass_body, obstacle_bodies, solid_body
+from .scene_objects import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, Glass, Solid, Things, half_sizes
+from .servos import leave_out_unused, mend_robot, use_velocity_servos
+
+TABLE_COLOR = "0.78 0.74 0.68 1"
+FRICTION = (1.0, 0.005, 0.0001)
+"""Of a wooden block: sliding, torsional, rolling."""
+
+
+class OneDemoTableScene(ManipulationEnv):
+    """Robot, table and things; used for its model only."""
+
+    def __init__(self, robot: str, gripper: str, things: Things, place: tuple[float | None, float]):
+        self.things, self.place = things, place
+        super().__init__(
+            robots=robot,
+            gripper_types=gripper,
+            controller_configs=robosuite.load_composite_controller_config(controller="BASIC"),
+            use_camera_obs=False,
+            has_renderer=False,
+            has_offscreen_renderer=False,
+            hard_reset=False,
+            ignore_done=True,
+            seed=0,
+        )
+
+    def _load_model(self) -> None:
+        super()._load_model()
+        robots: Any = self.robots
+        robot_model, side = robots[0].robot_model, 2 * TABLE_HALF_SIZE
+        x, y, z = robot_model.base_xpos_offset["table"](side)
+        robot_model.set_base_xpos((x if self.place[0] is None else self.place[0], y + self.place[1], z))
+        arena: Any = TableArena(table_full_size=(side, side, 0.05), table_offset=(0, 0, TABLE_HEIGHT))
+        arena.set_origin([0, 0, 0])
+        arena.table_visual.attrib.pop("material", None)
+        arena.table_visual.set("rgba", TABLE_COLOR)
+        wooden = [_wooden(each) for each in self.things.objects if isinstance(each, Solid) and each.texture]
+        self.model = ManipulationTask(arena, [robot_model], wooden)
+        self.model.worldbody.extend(_other_bodies(self.things))
+        slice_trunk(self.model.root)
+        mend_robot(self.model.root)
+        use_velocity_servos(self.model.root, set(robot_model.joints))
+        leave_out_unused(self.model.root)
+
+    def reward(self, action: Any = None) -> float:
+        """Nothing: robosuite asks for one."""
+        return 0.0
+
+
+def _other_bodies(things: Things) -> list[Element]:
+    """Everything that robosuite's own objects cannot be."""
+    free = [glass_body(each) for each in things.objects if isinstance(each, Glass)]
+    free += [solid_body(each) for each in things.objects if isinstance(each, Solid) and not each.texture]
+    free += [book_body(each) for each in things.objects if isinstance(each, Book)]
+    free += [furniture_body(each) for each in things.furniture]
+    beads = bead_bodies(things.beads) if things.beads else []
+    return [*free, *beads, *obstacle_bodies(things.obstacles)]
+
+
+def _wooden(block: Solid) -> BoxObject:
+    material = CustomMaterial(
+        texture=block.texture,
+        tex_name=f"{block.name}_texture",
+        mat_name=f"{block.name}_material",
+        tex_attrib={"type": "cube"},
+        mat_attrib={"texrepeat": "1 1", "specular": "0.2", "shininess": "0.05"},
+    )
+    return BoxObject(
+        block.name,
+        size=list(half_sizes(block.shape)[1]),
+        density=block.density,
+        friction=FRICTION,
+        material=material,
+        rng=np.random.default_rng(0),
+    )
+
+
+def table_env(robot: str, gripper: str, things: Things, place: tuple[float | None, float]) -> Any:
+    """A robosuite environment with the compiled model of the scene; `gripper` and `place`: see `Robot`."""
+    ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
+    return OneDemoTableScene(robot, gripper, things, place)

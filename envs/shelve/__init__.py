@@ -1,0 +1,1 @@
+"""Shelving books, and its single motion."""

@@ -1,0 +1,124 @@
+"""Where stand, cupboard, slots and books are at the start of an episode of shelving: ranges as data, seeded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...planner.geometry.pose import Pose
+from ..scene.scene_objects import TABLE_HEIGHT
+from .parts import CLUTTER, PITCH, clutter_poses, handed, slot, waiting
+from .places import ShelfPlaces
+
+WALL_GAP, FRONT_GAP = 0.002, 0.012
+"""Least distances of the clutter [m]."""
+MOST_BOOKS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """How far a layout may differ from the nominal one.
+
+    Attributes:
+        stand: largest shift of the stand in x and in y [m].
+        lower: by which it may be lower [m].
+        higher: by which it may be higher [m].
+        stand_yaw: its largest turn [rad].
+        cupboard: largest shift of the cupboard in x and in y [m].
+        cupboard_yaw: its largest turn [rad].
+        slots: largest shift of the three slots along the shelf [m].
+        book: largest shift of a book on the stand, in x and in y [m].
+        book_yaw: its largest turn on the stand [rad].
+        clutter: largest shift of each clutter book to the middle and to the back [m].
+        joints: largest change of a start joint [rad].
+    """
+
+    stand: float = 0.0
+    lower: float = 0.0
+    higher: float = 0.0
+    stand_yaw: float = 0.0
+    cupboard: float = 0.0
+    cupboard_yaw: float = 0.0
+    slots: float = 0.0
+    book: float = 0.0
+    book_yaw: float = 0.0
+    clutter: float = 0.0
+    joints: float = 0.0
+
+
+RANGES = {
+    "L0": Ranges(),
+    "L1": Ranges(
+        0.04, 0.05, 0.025, np.deg2rad(10.0), 0.01, np.deg2rad(5.0), 0.015, 0.003, np.deg2rad(2.0), 0.006, 0.05
+    ),
+    "L2": Ranges(0.08, 0.10, 0.05, np.deg2rad(15.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10),
+}
+"""By the name of a layout, see `levels`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShelfLayout:
+    """A start, in the world.
+
+    Attributes:
+        stand: the stand; x along the way in which a book is taken.
+        cupboard: the cupboard.
+        pile: x, y of the books that wait [m].
+        slots: shift of the middle of the slots along the shelf [m].
+        books: (n, 3) x, y [m] and yaw [rad] of each book on the stand, from its nominal place there.
+        clutter: (n, 2) gaps of the clutter, see `clutter_poses`.
+        joints: (n_arms, dof) offsets from the start joints [rad].
+    """
+
+    stand: Pose
+    cupboard: Pose
+    pile: tuple[float, float]
+    slots: float
+    books: np.ndarray
+    clutter: np.ndarray
+    joints: np.ndarray
+
+    def handed(self, k: int) -> Pose:
+        """Book k on the stand."""
+        return self.stand @ handed(self.books[k])
+
+    def objects(self) -> np.ndarray:
+        """(n, 7) all books at the start: the first on the stand, the others in the pile, the last at its bottom."""
+        count = len(self.books)
+        poses = [self.handed(0), *(waiting(self.pile, count - 1 - k) for k in range(1, count))]
+        poses += [self.cupboard @ pose for pose in clutter_poses(self.clutter)]
+        return np.array([pose.vector for pose in poses])
+
+    def furniture(self) -> np.ndarray:
+        """(3, 7) cupboard, stand, and the stand's foot."""
+        x, y, _ = self.stand.position
+        foot = Pose.from_position_quaternion([x, y, TABLE_HEIGHT], self.stand.quaternion)
+        return np.array([self.cupboard.vector, self.stand.vector, foot.vector])
+
+    def goals(self, shelf: str) -> np.ndarray:
+        """(n, 7) where the books must end."""
+        count = len(self.books)
+        along = self.slots + PITCH * (np.arange(count) - 0.5 * (count - 1))
+        return np.array([(self.cupboard @ slot(shelf, each)).vector for each in along])
+
+
+def shelf_layout(
+    rng: np.random.Generator, ranges: Ranges, places: ShelfPlaces, count: int, joints: tuple[int, ...]
+) -> ShelfLayout:
+    """A layout of `count` books, drawn from its ranges; `joints` is the shape (n_arms, dof) of the start joints."""
+    x, y = places.stand[:2] + rng.uniform(-ranges.stand, ranges.stand, 2)
+    z = places.stand[2] + rng.uniform(-ranges.lower, ranges.higher)
+    yaw = places.stand_yaw + rng.uniform(-ranges.stand_yaw, ranges.stand_yaw)
+    front = places.cupboard + rng.uniform(-ranges.cupboard, ranges.cupboard, 2)
+    turned = places.cupboard_yaw + rng.uniform(-ranges.cupboard_yaw, ranges.cupboard_yaw)
+    limits = np.array([ranges.book, ranges.book, ranges.book_yaw])
+    return ShelfLayout(
+        stand=Pose.from_yaw([x, y, z], yaw),
+        cupboard=Pose.from_yaw([*front, TABLE_HEIGHT], turned),
+        pile=places.pile,
+        slots=rng.uniform(-ranges.slots, ranges.slots),
+        books=rng.uniform(-limits, limits, (count, 3)),
+        clutter=np.array([WALL_GAP, FRONT_GAP]) + rng.uniform(0.0, ranges.clutter, (len(CLUTTER), 2)),
+        joints=rng.uniform(-ranges.joints, ranges.joints, joints),
+    )

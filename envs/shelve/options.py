@@ -1,0 +1,102 @@
+"""Places that a caller gives to shelving's `reset(options=...)`, checked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...planner.errors import BadOption
+from ...planner.geometry.pose import Pose
+from ..core.reset_options import checked_array, checked_poses
+from ..scene.scene_objects import TABLE_HEIGHT
+from .layout import ShelfLayout
+from .parts import BOOK_SIZE, CLUTTER, PITCH, SHELVES, WIDTH
+from .places import ShelfPlaces
+
+OPTIONS = ("level", "obstacles", "stand_pose", "cupboard_pose", "slots", "books", "clutter", "joint_positions")
+STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN = 0.12, 0.15, 0.10, np.deg2rad(45.0)
+"""How far a given stand may be from the nominal one [m, rad]."""
+CUPBOARD_WAY, CUPBOARD_TURN = 0.05, np.deg2rad(20.0)
+"""How far a given cupboard may be from the nominal one [m, rad]: it stands on the table, within reach."""
+LOWEST_STAND = 1.0
+"""z [m] of the stand's top below which its tube would come through the plate."""
+BOOK_WAY = np.array([0.015, 0.03, np.deg2rad(20.0)])
+"""How far a given book may lie from the middle of the stand, x, y [m] and yaw [rad]: it lies safely, fingers fit in."""
+BESIDE = 0.03
+"""Least room [m] for a finger beside a book that is let go."""
+
+
+def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlaces) -> ShelfLayout:
+    """The layout drawn, changed by what is given.
+
+    Raises:
+        BadOption: a stand or a cupboard that is out of reach, off the table or tilted; books that do not lie on the
+            stand; slots or clutter that are inside each other or the cupboard.
+    """
+    changes: dict[str, Any] = {}
+    if "stand_pose" in options:
+        lower = min(STAND_LOWER, places.stand[2] - LOWEST_STAND)
+        nominal, way = (places.stand, places.stand_yaw), (STAND_WAY, lower, STAND_HIGHER, STAND_TURN)
+        changes["stand"] = _standing("stand_pose", options["stand_pose"], nominal, way)
+    if "cupboard_pose" in options:
+        nominal, way = (
+            ((*places.cupboard, TABLE_HEIGHT), places.cupboard_yaw),
+            (CUPBOARD_WAY, 0.001, 0.001, CUPBOARD_TURN),
+        )
+        changes["cupboard"] = _standing("cupboard_pose", options["cupboard_pose"], nominal, way)
+    if "slots" in options:
+        changes["slots"] = float(checked_array("slots", options["slots"], ()))
+    if "books" in options:
+        changes["books"] = _lying(options["books"], len(drawn.books))
+    if "clutter" in options:
+        changes["clutter"] = checked_array("clutter", options["clutter"], (len(CLUTTER), 2))
+    layout = replace(drawn, **changes)
+    _check_room(layout)
+    return layout
+
+
+def _standing(option: str, value: Any, nominal: tuple[Any, float], way: tuple[float, float, float, float]) -> Pose:
+    """An upright pose near the nominal place (x, y, z) and yaw, by at most `way` to the side, down, up and in yaw."""
+    pose = Pose.from_vector(checked_poses(option, [value], 1)[0])
+    (x, y, z), yaw = nominal
+    aside, lower, higher, turn = way
+    off = pose.position - (x, y, z)
+    if pose.tilt > 0.01:
+        raise BadOption(option, "is tilted; only a yaw is possible")
+    if np.abs(off[:2]).max() > aside or not -lower <= off[2] <= higher:
+        places = f"x {x:g}, y {y:g} by {aside:g} m, z {z - lower:.4g} to {z + higher:.4g}"
+        raise BadOption(option, f"{np.round(pose.position, 3).tolist()} is out of reach or not a place; {places}")
+    if abs((pose.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi) > turn:
+        degrees = f"{np.degrees(yaw):.0f} by {np.degrees(turn):.0f} degrees"
+        raise BadOption(option, f"yaw of {np.degrees(pose.yaw):.0f} degrees cannot be reached; allowed: {degrees}")
+    return pose
+
+
+def _lying(value: Any, count: int) -> np.ndarray:
+    """Places (count, 3) on the stand."""
+    books = checked_array("books", value, (count, 3))
+    for k, off in enumerate(np.abs(books)):
+        if (off > BOOK_WAY).any():
+            x, y, yaw = BOOK_WAY
+            allowed = f"x by {x:g} m, y by {y:g} m, yaw by {yaw:.2f} rad"
+            raise BadOption(
+                "books", f"book {k} at {np.round(books[k], 3).tolist()} would not lie on the stand; {allowed}"
+            )
+    return books
+
+
+def _check_room(layout: ShelfLayout) -> None:
+    """Clutter and slots are in the cupboard and beside each other."""
+    if (layout.clutter < 0.0).any():
+        raise BadOption("clutter", f"gap {layout.clutter.min():.4g} m is negative: inside the wall or before the front")
+    reach = 0.5 * (PITCH * (len(layout.books) - 1) + BOOK_SIZE[1])
+    for shelf in SHELVES:
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            rows = [k for k, each in enumerate(CLUTTER) if each[:2] == (shelf, side)]
+            taken = sum(layout.clutter[k, 0] + CLUTTER[k][2][1] for k in rows)
+            room = 0.5 * WIDTH - taken - sign * layout.slots - reach
+            if room < BESIDE:
+                reason = f"leave {room:.3f} m beside the slots of the {shelf} shelf; {BESIDE} m are needed"
+                raise BadOption("slots", f"with the clutter on the {side} {reason}")

@@ -1,0 +1,112 @@
+"""The cupboard, its books and the stand they are handed over on: sizes, colors and places, no simulator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...planner.geometry.pose import Pose
+from ...planner.geometry.shapes import Box, Cylinder
+from ..scene.scene_objects import TABLE_HEIGHT, Book, Color, Furniture, Part
+
+BOOK_SIZE = (0.16, 0.035, 0.22)
+"""Of the books to shelve: depth, thickness, height [m]; 0.3 kg."""
+COLORS: tuple[Color, ...] = ((0.70, 0.16, 0.15, 1.0), (0.13, 0.30, 0.56, 1.0), (0.16, 0.45, 0.26, 1.0))
+SHELVES = {"lower": 0.15, "upper": 0.42}
+"""Heights of the shelf boards above the table [m]."""
+DEPTH, WIDTH, CLEAR = 0.24, 0.52, 0.26
+"""Inside of a shelf [m]; `CLEAR` is its height."""
+PITCH = 0.07
+"""From slot to slot [m]: what leaves room for the fingers beside the neighbor."""
+INSET = 0.01
+"""Of a shelved book's spine behind the front edge [m]."""
+PLATE = (0.11, 0.10, 0.012)
+"""Of the stand: along the way in which a book is taken, across, thickness [m]."""
+OVERHANG = 0.05
+"""Of a book's spine over the stand [m]: room for the fingers."""
+TURNED = (0.5**0.5, 0.5**0.5, 0.0, 0.0)
+"""A book that lies (wxyz): its x stays, its back cover is up."""
+PILE_YAW = 1.0
+WOOD: Color = (0.76, 0.58, 0.39, 1.0)
+DARK_WOOD: Color = (0.58, 0.41, 0.26, 1.0)
+STEEL: Color = (0.46, 0.48, 0.51, 1.0)
+BOARD, SIDE, BACK = 0.010, 0.012, 0.006
+"""Thicknesses [m]."""
+CLUTTER = (
+    ("upper", "left", (0.17, 0.042, 0.230), (0.85, 0.62, 0.20, 1.0)),
+    ("upper", "left", (0.15, 0.030, 0.200), (0.42, 0.27, 0.47, 1.0)),
+    ("upper", "right", (0.16, 0.038, 0.210), (0.15, 0.48, 0.51, 1.0)),
+    ("lower", "left", (0.18, 0.050, 0.240), (0.36, 0.24, 0.18, 1.0)),
+    ("lower", "right", (0.14, 0.032, 0.190), (0.78, 0.37, 0.20, 1.0)),
+)
+"""Books that stand there already: shelf, side, size [m] and color, from the side's wall inwards."""
+
+
+def books(count: int) -> tuple[Book, ...]:
+    """Those to shelve, then the clutter."""
+    wanted = [Book(f"book{k}", BOOK_SIZE, color) for k, color in enumerate(COLORS[:count])]
+    return (*wanted, *(Book(f"clutter{k}", size, color) for k, (*_, size, color) in enumerate(CLUTTER)))
+
+
+def _board(size: tuple[float, float, float], place: tuple[float, float, float], color: Color = WOOD) -> Part:
+    return Part(Box(size), (*place, 1.0, 0.0, 0.0, 0.0), color)
+
+
+def cupboard() -> Furniture:
+    """Two shelves on a plinth. Its frame is at the middle of its front, at table height, x pointing in."""
+    middle, wide, foot = 0.5 * DEPTH, WIDTH + 2.0 * SIDE, SHELVES["lower"] - 0.015
+    roof = SHELVES["upper"] + CLEAR
+    tall, center = roof + BOARD - foot, 0.5 * (roof + BOARD + foot)
+    return Furniture(
+        "cupboard",
+        (
+            _board((DEPTH - 0.03, wide - 0.02, foot), (middle + 0.015, 0.0, 0.5 * foot), DARK_WOOD),
+            _board((DEPTH, WIDTH, 0.015), (middle, 0.0, foot + 0.0075)),
+            _board((DEPTH, WIDTH, BOARD), (middle, 0.0, SHELVES["upper"] - 0.5 * BOARD)),
+            _board((DEPTH, WIDTH, BOARD), (middle, 0.0, roof + 0.5 * BOARD)),
+            _board((DEPTH, SIDE, tall), (middle, 0.5 * (WIDTH + SIDE), center)),
+            _board((DEPTH, SIDE, tall), (middle, -0.5 * (WIDTH + SIDE), center)),
+            _board((BACK, wide, tall), (DEPTH + 0.5 * BACK, 0.0, center), DARK_WOOD),
+        ),
+    )
+
+
+def stand() -> tuple[Furniture, Furniture]:
+    """A plate on a rod, its frame in the middle of the plate's top, x along the way in; and the tube it slides in."""
+    rod = Part(Cylinder(0.016, 0.238), (0.0, 0.0, -0.131, 1.0, 0.0, 0.0, 0.0), STEEL)
+    tube = Part(Cylinder(0.021, 0.18), (0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0), STEEL)
+    foot = Part(Cylinder(0.055, 0.012), (0.0, 0.0, 0.006, 1.0, 0.0, 0.0, 0.0), STEEL)
+    plate = _board(PLATE, (0.0, 0.0, -0.5 * PLATE[2]), DARK_WOOD)
+    return Furniture("stand", (plate, rod)), Furniture("foot", (foot, tube))
+
+
+def slot(shelf: str, along: float) -> Pose:
+    """Where a book ends, in the cupboard's frame, `along` [m] to the left of the middle."""
+    height = SHELVES[shelf] + 0.5 * BOOK_SIZE[2]
+    return Pose.from_position_quaternion([INSET + 0.5 * BOOK_SIZE[0], along, height])
+
+
+def handed(offset: np.ndarray) -> Pose:
+    """A book that lies on the stand, in the stand's frame, `offset` (3,): x, y [m] and yaw [rad] from the middle."""
+    middle = 0.5 * (BOOK_SIZE[0] - PLATE[0]) - OVERHANG
+    turned = Pose.from_yaw([middle + offset[0], offset[1], 0.5 * BOOK_SIZE[1]], offset[2])
+    return turned @ Pose.from_position_quaternion([0, 0, 0], TURNED)
+
+
+def waiting(pile: tuple[float, float], order: int) -> Pose:
+    """A book in the pile at a place (x, y) on the table [m], `order` from the bottom, in the world."""
+    height = TABLE_HEIGHT + (order + 0.5) * BOOK_SIZE[1]
+    lying = Pose.from_position_quaternion([0, 0, 0], TURNED)
+    return Pose.from_yaw([*pile, height], PILE_YAW + 0.12 * order) @ lying
+
+
+def clutter_poses(gaps: np.ndarray) -> list[Pose]:
+    """Where the clutter stands in the cupboard's frame; `gaps` (n, 2) from its neighbor and from the front [m]."""
+    taken: dict[tuple[str, str], float] = {}
+    found = []
+    for (shelf, side, size, _), (beside, behind) in zip(CLUTTER, gaps, strict=True):
+        edge = taken.get((shelf, side), 0.0) + beside
+        taken[shelf, side] = edge + size[1]
+        along = 0.5 * WIDTH - edge - 0.5 * size[1]
+        place = [behind + 0.5 * size[0], along if side == "left" else -along, SHELVES[shelf] + 0.5 * size[2]]
+        found.append(Pose.from_position_quaternion(place))
+    return found

@@ -1,0 +1,235 @@
+"""Shelving books in a cluttered cupboard."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...planner.errors import BadOption
+from ...planner.geometry.pose import Pose
+from ...planner.geometry.shapes import Box, Obstacle, pack
+from ..core.environment import MAX_LAYOUTS, Observation, OneDemoEnv, checked_choice
+from ..core.obstacle_placement import Leg, Order
+from ..core.reset_options import check_known, checked_joints
+from ..core.spaces import pose_box
+from ..scene.body_clearance import arm_room
+from ..scene.robots import places_of, robot_named
+from ..scene.scene_objects import Things
+from ..simulation.render import Ghost, View
+from ..simulation.simulation import Start
+from ..simulation.state import State
+from .layout import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
+from .options import OPTIONS, given_layout
+from .parts import BOOK_SIZE, SHELVES, books, cupboard, stand
+from .places import SHELF_PLACES
+from .rules import ShelveProgress
+
+VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
+LIFT, WAY_IN = 0.15, 0.22
+"""Heights above the stand and way before the slot at the ends of a carry [m]."""
+GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
+"""Hand (tcp) in the frame of a book that it holds by the spine, 25 mm deep, fingers on its covers."""
+SPREAD = 0.15
+"""Of obstacles about the hand's way [m]: a book and the hand behind it sweep far more than the way itself, which is
+so short that what lies right on it would be in the way of the hand before the slot, too."""
+START_CLEAR = 0.03
+"""The robot is at least this far from the first book at the start [m]."""
+CLEAR = 0.08
+"""The robot is at least this far from the stand while a book is put there [m]."""
+PAPER_SIZES = (0.06, 0.09)
+"""Of the obstacles that appear while the second and the third book are placed [m]."""
+
+
+class ShelveEnv(OneDemoEnv[ShelveProgress]):
+    """Shelve three books in the upper shelf of a cluttered cupboard, with one arm.
+
+    ## Description
+    A cupboard with two shelves stands on a table, turned so that the robot reaches it: for the Panda, books go in
+    along a yaw of about 75 degrees; other books stand in it. Three books (160 x 220 x 35 mm, 0.3 kg) are handed over
+    one at a time on a stand at about shelf height, lying, spine over its edge. They must be put upright, spine to the
+    front, into three slots 70 mm apart. They are held by friction between the fingers only.
+
+    Handing over is the human's part, and the environment plays it: books that are not handed over yet wait in a
+    pile on the table, and when book k is in its slot, let go, and the whole robot is 8 cm away from its place, the
+    next book is taken from the pile and laid onto the stand at once. The robot never touches a book that is moved
+    so. Everything else is physics.
+
+    Success is judged from the simulator: every book within 10 mm and 5 degrees of its slot, touched by no finger, at
+    rest, the hand withdrawn by 15 cm, no clutter book moved by more than 5 cm or turned by more than 15 degrees, for
+    half a second.
+
+    ## Action Space
+    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
+
+    | control mode | entry | meaning |
+    |---|---|---|
+    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
+    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
+    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
+    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+
+    ## Observation Space
+    A `Dict` of float64 boxes; the first axis counts arms or books. Poses are `x y z [m]`, then quaternion wxyz.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | `joint_positions` | (1, 7) | [rad] |
+    | `joint_velocities` | (1, 7) | [rad/s] |
+    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `gripper_opening` | (1,) | gap between the finger pads [m] |
+    | `object_pose` | (n + 5, 7) | the books, then the clutter; a book's x points away from its spine, z along it |
+    | `goal_pose` | (n, 7) | where each book must end; constant during an episode |
+    | `furniture_pose` | (3, 7) | cupboard, stand and the stand's foot; constant during an episode |
+    | `motion_index` | (1,) | 2k while book k is to be fetched, 2k + 1 while it is held, 2n when all are shelved |
+    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
+    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
+    | `obstacle_pose` | (3, 7) | the obstacles |
+    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+
+    ## Rewards
+    `reward="dense"`: in [0, 1], the share of the task that is done, with reaching, grasping and carrying of the
+    current book in between. `reward="sparse"`: 1 with success, else 0.
+
+    ## Starting State
+    By `level`: L0 the nominal places; L1 the stand moved by up to 4 cm, 5 cm lower to 2.5 cm higher, turned by up to
+    10 degrees, the cupboard by up to 1 cm and 5 degrees, the slots by up to 15 mm along the shelf, books by up to
+    3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 15
+    degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. Each robot has its own nominal places.
+
+    L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way from stand to cupboard,
+    L4 one that swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the
+    forearm passes. R, S and T start as L1 does. Obstacles are solid; they overlap what hand and book sweep on the
+    straight way and leave room at the start, at every grasp and at every slot, whatever method is used.
+
+    ## Episode End
+    `terminated` with a settled success, or when a book has fallen off the table. `truncated` after 90 s (Gymnasium's
+    `TimeLimit`).
+
+    ## Info
+    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
+    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
+    what it holds), `layouts_refused` (starts that had no room for the obstacles), `books_placed`,
+    `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
+
+    ## Arguments
+    `robot="Panda"` (others: `onedemo.envs.shelve.places.SHELF_PLACES`; of Baxter the right arm), `n_books=3` (1 to 3),
+    `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`, `obstacles=None` (what the
+    level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"` (two of different
+    size appear while the last two books are carried), `control_mode="joint_velocity" | "ee_twist"`,
+    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
+    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `stand_pose` (7,),
+    `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `books` (n, 3: x, y [m] and yaw [rad] of each on the
+    stand, from its middle), `clutter` (5, 2: gaps [m] from neighbor or wall, and from the front) and
+    `joint_positions` (7,).
+
+    ## Version History
+    * v0: first version.
+    """
+
+    def __init__(
+        self,
+        robot: str = "Panda",
+        n_books: int = 3,
+        shelf: str = "upper",
+        level: str = "L1",
+        obstacles: str | None = None,
+        control_mode: str = "joint_velocity",
+        reward: str = "sparse",
+        control_frequency: int = 50,
+        render_mode: str | None = None,
+    ):
+        if isinstance(n_books, bool) or not isinstance(n_books, int) or not 1 <= n_books <= MOST_BOOKS:
+            raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
+        self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
+        objects, furniture = books(n_books), (cupboard(), *stand())
+        self._places = places_of(SHELF_PLACES, robot, "shelve")
+        robot_named(robot).check_grip(BOOK_SIZE[1], robot, "a book")
+        super().__init__(
+            name="shelve",
+            robot=robot,
+            things=Things(objects, furniture),
+            goals=n_books,
+            motions=2 * n_books,
+            level=level,
+            obstacles=obstacles,
+            control_mode=control_mode,
+            reward=reward,
+            render_mode=render_mode,
+            control_frequency=control_frequency,
+            view=VIEW,
+            more={"furniture_pose": pose_box(len(furniture))},
+        )
+        self._ready = np.array([self._places.ready])
+        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], self._places, n_books, self._ready.shape)
+        self._take_layout(self._drawn)
+
+    def _take_layout(self, drawn: ShelfLayout) -> None:
+        self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
+        self._furniture = drawn.furniture()
+        self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
+
+    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+        check_known(options, OPTIONS)
+        drawn, joints = self._drawn_clear(options, layout)
+        self._take_layout(drawn)
+        return Start(joints, drawn.objects(), self._furniture)
+
+    def _drawn_clear(self, options: dict[str, Any], layout: str) -> tuple[ShelfLayout, np.ndarray]:
+        """A layout and start joints at which the hand is not already at the book."""
+        lower, upper = [arm.lower for arm in self.arms], [arm.upper for arm in self.arms]
+        for _ in range(MAX_LAYOUTS):
+            drawn = shelf_layout(self.np_random, RANGES[layout], self._places, self.n_books, self._ready.shape)
+            drawn = given_layout(drawn, options, self._places)
+            if "joint_positions" in options:
+                return drawn, checked_joints(options["joint_positions"], self.arms)
+            joints = np.clip(self._ready + drawn.joints, lower, upper)
+            if self._is_clear(drawn.handed(0), joints, START_CLEAR):
+                return drawn, joints
+        raise BadOption("stand_pose", "the robot would start at the book; give joint_positions that are away from it")
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Act for one control step; afterwards the next book is handed over, if it is time."""
+        reached = super().step(action)
+        k = self._progress.handed
+        if (
+            k < self.n_books
+            and self._progress.placed == k
+            and self._is_clear(self._drawn.handed(k), reached[0]["joint_positions"], CLEAR)
+        ):
+            pose = self._drawn.handed(k).vector
+            self.sim.put(k, pose)
+            self._progress.hand_over(pose)
+        return reached
+
+    def _is_clear(self, place: Pose, joints: np.ndarray, room: float) -> bool:
+        """Whether the whole robot, at joints (n_arms, dof), is `room` away from where a book is or is to be put."""
+        book = pack([Obstacle(Box(BOOK_SIZE), place)])
+        return all(
+            arm_room(arm, body, q, book) >= room
+            for arm, body, q in zip(self.arms, self._task.bodies, joints, strict=True)
+        )
+
+    def _legs(self, start: Start) -> list[Leg]:
+        """The carries: from above the stand to before the slot."""
+        legs = []
+        for k, goal in enumerate(self._goal_pose):
+            grasp, release = self._drawn.handed(k) @ GRASP, Pose.from_vector(goal) @ GRASP
+            up = Pose.from_position_quaternion([0.0, 0.0, LIFT])
+            back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
+            keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
+            held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
+            legs.append(Leg(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
+        return legs
+
+    def _paper(self, legs: list[Leg]) -> list[Order]:
+        """One appears while the last but one book is carried, another one, of another size, with the last."""
+        last = len(legs) - 1
+        return [Order("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
+
+    def _ghosts(self) -> list[Ghost]:
+        return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose[self._progress.placed :]]
+
+    def _more_observed(self, state: State) -> Observation:
+        return {"furniture_pose": self._furniture.copy()}

@@ -1,0 +1,1 @@
+"""What happens at every step: physics, obstacles, distances, pictures."""

@@ -1,0 +1,176 @@
+"""Bodies in the way: their shape, when they are there, how they move. Solid to the robot, moved by nobody's force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ...planner.geometry.pose import Pose
+from ...planner.geometry.shapes import Box, Capsule, Shape, Sphere
+from ..scene.scene import Scene
+from ..scene.scene_objects import extents, half_sizes
+
+KINDS: dict[type, float] = {Sphere: 1.0, Box: 2.0, Capsule: 3.0}
+"""Codes of `obstacle_shape`; 0 is none."""
+GEOM = {
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+}
+AWAY = (0.0, 0.0, -3.0)
+"""Where an obstacle is that is not there [m]."""
+ROOM = 0.05
+"""Nothing appears nearer than this to the robot or an object [m]: it waits until there is room."""
+
+
+@dataclass(frozen=True)
+class Intruder:
+    """A body in the way. Its center is at `center + long sin(w t + phase) + short cos(w t + phase)`.
+
+    Attributes:
+        shape: a sphere, box or capsule.
+        center: (3,) [m].
+        rotation: wxyz (4,).
+        long: (3,) of the ellipse that it goes round [m]; zero for one that stands still.
+        short: (3,) [m], at right angles to `long`.
+        frequency: w [rad/s].
+        phase: [rad].
+        motion: index of the task's motion during which it appears; 0: it is there from the start.
+        delay: seconds after that motion's beginning.
+        leg: index of the motion that it was put in the way of.
+    """
+
+    shape: Shape
+    center: tuple[float, float, float]
+    rotation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    long: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    short: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    frequency: float = 0.0
+    phase: float = 0.0
+    motion: int = 0
+    delay: float = 0.0
+    leg: int = 0
+
+    def position(self, seconds: float) -> np.ndarray:
+        """Center (3,) at a time [m]."""
+        angle = self.frequency * seconds + self.phase
+        return np.array(self.center) + np.sin(angle) * np.array(self.long) + np.cos(angle) * np.array(self.short)
+
+    def velocity(self, seconds: float) -> np.ndarray:
+        """Velocity (3,) of the center at a time [m/s]."""
+        angle = self.frequency * seconds + self.phase
+        along, across = np.cos(angle) * np.array(self.long), np.sin(angle) * np.array(self.short)
+        return self.frequency * (along - across)
+
+    def pose(self, seconds: float) -> Pose:
+        """Pose at a time."""
+        return Pose.from_position_quaternion(self.position(seconds), self.rotation)
+
+
+def described(shape: Shape) -> np.ndarray:
+    """(3,) of `obstacle_size`: extents of a box; radius, radius and length of a capsule; or a radius."""
+    if isinstance(shape, Box):
+        return np.array(shape.size)
+    if isinstance(shape, Capsule):
+        return np.array([shape.radius, shape.radius, shape.length])
+    if isinstance(shape, Sphere):
+        return np.array([shape.radius] * 3)
+    raise TypeError(f"an obstacle is a sphere, a box or a capsule, not {type(shape).__name__}")
+
+
+class ObstacleSlots:
+    """The obstacles of an episode in a simulation's model and data, and what is observed of them.
+
+    Attributes:
+        intruders: those of this episode.
+        active: (n,) which are there.
+    """
+
+    def __init__(self, scene: Scene, model: mujoco.MjModel, data: mujoco.MjData):
+        self._index, self._model, self._data = scene.obstacles, model, data
+        self._mocap = model.body_mocapid[scene.obstacles[:, 0]]
+        count = len(scene.obstacles)
+        self.intruders: tuple[Intruder, ...] = ()
+        self.active = np.zeros(count, dtype=bool)
+        self._due = np.full(count, np.inf)
+
+    @property
+    def count(self) -> int:
+        """How many there can be."""
+        return len(self._index)
+
+    def reset(self, intruders: tuple[Intruder, ...]) -> None:
+        """Take the obstacles of a new episode; those there from the start are put in place."""
+        self.intruders = intruders
+        self.active[:] = False
+        self._due[:] = np.inf
+        for slot in range(self.count):
+            self._park(slot)
+        for slot, each in enumerate(intruders):
+            self._form(slot, each.shape)
+            if each.motion == 0:
+                self._due[slot] = 0.0
+                self._show(slot, 0.0)
+
+    def advance(self, seconds: float, motion: float, has_room: Any) -> None:
+        """Move all to where they are at a time, and let appear what is due.
+
+        Args:
+            seconds: since the episode's start, at the end of the coming control step.
+            motion: index of the current motion.
+            has_room: called with a slot and a pose; whether a body may appear there.
+        """
+        for slot, each in enumerate(self.intruders):
+            if self.active[slot]:
+                if each.frequency:
+                    self._data.mocap_pos[self._mocap[slot]] = each.position(seconds)
+                continue
+            if np.isinf(self._due[slot]) and motion >= each.motion:
+                self._due[slot] = seconds + each.delay
+            if seconds >= self._due[slot] and has_room(slot, each.pose(seconds)):
+                self._show(slot, seconds)
+
+    def observed(self, seconds: float) -> dict[str, np.ndarray]:
+        """The entries of the observation, in new arrays."""
+        entries = self._blank()
+        if not self.intruders:
+            return entries
+        for slot in np.flatnonzero(self.active):
+            each = self.intruders[slot]
+            entries["obstacle_active"][slot] = 1.0
+            entries["obstacle_shape"][slot] = KINDS[type(each.shape)]
+            entries["obstacle_size"][slot] = described(each.shape)
+            entries["obstacle_pose"][slot] = each.pose(seconds).vector
+            entries["obstacle_velocity"][slot] = each.velocity(seconds)
+        return entries
+
+    def _blank(self) -> dict[str, np.ndarray]:
+        rows = {"active": (), "shape": (), "size": (3,), "pose": (7,), "velocity": (3,)}
+        return {f"obstacle_{key}": np.zeros((self.count, *shape)) for key, shape in rows.items()}
+
+    def _form(self, slot: int, shape: Shape) -> None:
+        """Give a slot's geoms a shape, and the bounds that MuJoCo's broad phase goes by."""
+        model, (body, solid, seen) = self._model, self._index[slot]
+        kind, half = half_sizes(shape)
+        box = np.concatenate([np.zeros(3), 0.5 * extents(shape)])
+        for geom in (solid, seen):
+            model.geom_type[geom], model.geom_size[geom] = GEOM[kind], half
+            model.geom_rbound[geom] = np.linalg.norm(box[3:]) if kind == "box" else box[3:].max()
+            model.geom_aabb[geom] = box
+        nodes = slice(model.body_bvhadr[body], model.body_bvhadr[body] + model.body_bvhnum[body])
+        model.bvh_aabb[nodes] = box
+
+    def _show(self, slot: int, seconds: float) -> None:
+        pose, solid = self.intruders[slot].pose(seconds), self._index[slot, 1]
+        self._model.geom_contype[solid] = self._model.geom_conaffinity[solid] = 1
+        self._data.mocap_pos[self._mocap[slot]] = pose.position
+        self._data.mocap_quat[self._mocap[slot]] = pose.quaternion
+        self.active[slot] = True
+
+    def _park(self, slot: int) -> None:
+        solid = self._index[slot, 1]
+        self._model.geom_contype[solid] = self._model.geom_conaffinity[solid] = 0
+        self._data.mocap_pos[self._mocap[slot]] = AWAY

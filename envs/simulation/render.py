@@ -1,0 +1,193 @@
+"""Images and a window of a simulation; OpenGL is not touched before the first picture."""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import os
+import weakref
+from collections.abc import Iterable
+from ctypes.util import find_library
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ...planner.errors import RenderingUnavailable
+from ...planner.geometry.shapes import Shape
+from ..scene.scene_objects import half_sizes
+
+LOGGER = logging.getLogger(__name__)
+WIDTH, HEIGHT = 640, 480
+GHOST_COLOR = (0.35, 0.55, 0.95, 0.16)
+BACKENDS = {"egl": "EGL", "osmesa": "OSMesa", "glfw": None}
+"""MuJoCo's offscreen backends and the library that each needs."""
+
+
+def _backends() -> list[str]:
+    """The backends to try, in order: what MUJOCO_GL names, else what is installed."""
+    wanted = os.environ.get("MUJOCO_GL", "").lower()
+    if wanted in BACKENDS:
+        return [wanted]
+    found = [name for name, library in BACKENDS.items() if library and find_library(library)]
+    return found[:1] + (["glfw"] if os.environ.get("DISPLAY") else [])
+
+
+def _opened_context(width: int, height: int) -> Any:
+    """A current OpenGL context.
+
+    Raises:
+        RenderingUnavailable: none could be opened.
+    """
+    reasons = []
+    for name in _backends():
+        try:
+            context = import_module(f"mujoco.{name}").GLContext(width, height)
+            context.make_current()
+            return context
+        except Exception as error:  # the backends raise whatever their libraries do
+            reasons.append(f"{name}: {error}")
+    raise RenderingUnavailable("; ".join(reasons) or "no OpenGL library found")
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the camera is.
+
+    Attributes:
+        look_at: (3,) what it looks at [m].
+        distance: from there [m].
+        azimuth: direction that it looks in [degrees].
+        elevation: negative from above [degrees].
+    """
+
+    look_at: tuple[float, float, float] = (-0.12, 0.0, 0.93)
+    distance: float = 1.05
+    azimuth: float = 148.0
+    elevation: float = -24.0
+
+
+TABLE_VIEW = View()
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """A shape that is drawn but not there, at a pose (7,)."""
+
+    pose: np.ndarray
+    shape: Shape
+
+
+def _add(scene: mujoco.MjvScene, ghost: Ghost) -> None:
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, ghost.pose[3:])
+    geom = scene.geoms[scene.ngeom]
+    name, half = half_sizes(ghost.shape)
+    kind, color = getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}"), np.array(GHOST_COLOR, dtype=np.float32)
+    size = np.array(half if name == "box" else (half[0], half[0], half[1] if name != "sphere" else half[0]))
+    mujoco.mjv_initGeom(geom, kind, size, ghost.pose[:3], matrix, color)
+    scene.ngeom += 1
+
+
+def _free(context: mujoco.MjrContext, opengl: Any) -> None:
+    opengl.make_current()
+    context.free()
+    opengl.free()
+
+
+class _Offscreen:
+    """A picture buffer of a model."""
+
+    def __init__(self, model: mujoco.MjModel):
+        model.vis.global_.offwidth = max(WIDTH, model.vis.global_.offwidth)
+        model.vis.global_.offheight = max(HEIGHT, model.vis.global_.offheight)
+        self._model = model
+        self._opengl = _opened_context(WIDTH, HEIGHT)
+        self._scene = mujoco.MjvScene(model, 2000)
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self.close = weakref.finalize(self, _free, self._context, self._opengl)
+        # the backend shuts OpenGL down at exit: free before that, hence registered after it
+        self.close.atexit = False
+        atexit.register(self.close)
+
+    def image(
+        self,
+        data: mujoco.MjData,
+        camera: mujoco.MjvCamera,
+        options: mujoco.MjvOption,
+        ghosts: Iterable[Ghost],
+    ) -> np.ndarray:
+        self._opengl.make_current()
+        viewport = mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(self._model, data, options, None, camera, every, self._scene)
+        for ghost in ghosts:
+            _add(self._scene, ghost)
+        mujoco.mjr_render(viewport, self._scene, self._context)
+        pixels = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(pixels, None, viewport, self._context)
+        return np.ascontiguousarray(pixels[::-1])
+
+
+class Renderer:
+    """The scene's camera: pictures in memory, or MuJoCo's window."""
+
+    def __init__(self, model: mujoco.MjModel, view: View):
+        self._model, self._view = model, view
+        self._camera = mujoco.MjvCamera()
+        self._aim(self._camera)
+        self._options = mujoco.MjvOption()
+        # visual twins are in group 1, collision geoms in group 0
+        self._options.geomgroup[:] = [0, 1, 0, 0, 0, 0]
+        self._options.sitegroup[:] = 0
+        self._offscreen: _Offscreen | None = None
+        self._window: Any = None
+        self._told = False
+
+    def image(self, data: mujoco.MjData, ghosts: Iterable[Ghost] = ()) -> np.ndarray:
+        """(HEIGHT, WIDTH, 3) uint8; ghosts are translucent.
+
+        Raises:
+            RenderingUnavailable: no OpenGL library can be used.
+        """
+        if self._offscreen is None:
+            self._offscreen = _Offscreen(self._model)
+        return self._offscreen.image(data, self._camera, self._options, ghosts)
+
+    def show(self, data: mujoco.MjData) -> None:
+        """Bring the window up to date; the first call opens it, if there is a display."""
+        if self._window is None and not self._has_display():
+            return
+        if self._window is None:
+            viewer = import_module("mujoco.viewer")
+            self._window = viewer.launch_passive(self._model, data, show_left_ui=False, show_right_ui=False)
+            self._aim(self._window.cam)
+            self._window.opt.geomgroup[:] = self._options.geomgroup
+            self._window.opt.sitegroup[:] = 0
+        self._window.sync()
+
+    def close(self) -> None:
+        """Free the picture buffer and close the window."""
+        if self._offscreen is not None:
+            self._offscreen.close()
+        if self._window is not None:
+            self._window.close()
+        self._offscreen = self._window = None
+
+    def _has_display(self) -> bool:
+        found = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+        if not found and not self._told:
+            LOGGER.warning("no display: the window of render_mode='human' stays closed")
+            self._told = True
+        return found
+
+    def _aim(self, camera: mujoco.MjvCamera) -> None:
+        camera.lookat[:] = self._view.look_at
+        camera.distance, camera.azimuth, camera.elevation = (
+            self._view.distance,
+            self._view.azimuth,
+            self._view.elevation,
+        )

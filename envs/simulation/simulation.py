@@ -1,0 +1,166 @@
+"""A scene being simulated by MuJoCo alone."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from ...planner.robot.kinematics import FRAME
+from ..scene.arm_index import ArmIndex
+from ..scene.scene import FINGERS, FIRST_OBJECT, compiled_scene
+from ..scene.scene_objects import Things
+from .moving_obstacles import Intruder, ObstacleSlots
+from .obstacle_distance import Nearness
+from .state import State, command, read_arms, read_objects
+
+PHYSICS_DT = 0.002
+
+
+class Start(NamedTuple):
+    """Where everything is when an episode begins.
+
+    Attributes:
+        joints: (n_arms, dof) joint positions [rad].
+        objects: (n_objects, 7) world poses, x y z [m] and wxyz.
+        furniture: (n_furniture, 7) world poses.
+        beads: (n_beads, 3) places [m].
+        intruders: the obstacles.
+        grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing round something; nan: it is open.
+    """
+
+    joints: np.ndarray
+    objects: np.ndarray
+    furniture: np.ndarray = np.zeros((0, 7))
+    beads: np.ndarray = np.zeros((0, 3))
+    intruders: tuple[Intruder, ...] = ()
+    grips: np.ndarray | None = None
+
+
+class Simulation:
+    """A scene being simulated: state in, physics, state out."""
+
+    def __init__(self, robot: str, things: Things, sides: tuple[str, ...] | None = None):
+        self.scene = compiled_scene(robot, things, sides)
+        self.model = copy.copy(self.scene.model)
+        self.data = mujoco.MjData(self.model)
+        arms, data, model = self.scene.arms, self.data, self.model
+        self._widest = [self._measured_opening(arm) for arm in arms]
+        self._views = (data.qpos, data.qvel, data.site_xmat, data.geom_xpos)
+        self._ctrl = data.ctrl
+        self._servos = np.array([arm.ctrl for arm in arms])
+        self._grips = np.array([np.column_stack([arm.grip, arm.opened, arm.closed]) for arm in arms])
+        offsets = [wide - self._pad_distance(arm) for wide, arm in zip(self._widest, arms, strict=True)]
+        attitudes = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
+        self._homes = np.column_stack([attitudes, offsets])
+        self._chains = np.array([arm.arm.chain for arm in arms])
+        self._frames = np.empty((arms[0].arm.dof, FRAME))
+        self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
+        bodies, owners = self.scene.objects, FIRST_OBJECT + len(things.objects)
+        self._object_places = model.jnt_qposadr[model.body_jntadr[bodies]].astype(np.int64)
+        self._object_index = np.column_stack([self._object_places, model.body_dofadr[bodies]])
+        self._touching = np.zeros((owners, owners))
+        self.obstacles = ObstacleSlots(self.scene, model, data)
+        self._near = Nearness(self.scene, model, data)
+        self._no_beads = np.zeros((0, 3))
+
+    def reset(self, start: Start) -> None:
+        """Put everything in place, at rest, with open grippers where none holds something."""
+        mujoco.mj_resetData(self.model, self.data)
+        grips = np.full(len(self.scene.arms), np.nan) if start.grips is None else start.grips
+        for arm, q, gap, widest in zip(self.scene.arms, start.joints, grips, self._widest, strict=True):
+            self._put(arm, q, 0.5 * (widest - gap) if np.isfinite(gap) else 0.0)
+        for arm, q in zip(self.scene.parked, self.scene.parked_joints, strict=True):
+            self._put(arm, q, 0.0)
+        for address, pose in zip(self._object_places, start.objects, strict=True):
+            self.data.qpos[address : address + 7] = pose
+        if len(start.furniture):
+            self.data.mocap_pos[self.scene.furniture] = start.furniture[:, :3]
+            self.data.mocap_quat[self.scene.furniture] = start.furniture[:, 3:]
+        if len(start.beads):
+            self.data.qpos[self.scene.beads] = start.beads
+        self.obstacles.reset(start.intruders)
+        self._near.reset()
+        mujoco.mj_forward(self.model, self.data)
+
+    def put(self, index: int, pose: np.ndarray) -> None:
+        """Lay an object at a pose (7,), at rest: for what a human does, never for what the robot touches."""
+        address, dof = self._object_index[index]
+        self.data.qpos[address : address + 7] = pose
+        self.data.qvel[dof : dof + 6] = 0.0
+
+    def _put(self, arm: ArmIndex, q: np.ndarray, inwards: float) -> None:
+        """Put an arm at joints q (dof,), open, or closing with each finger some way [m] inwards."""
+        self.data.qpos[arm.qpos] = q
+        self.data.act[arm.act] = q
+        self.data.ctrl[arm.grip] = arm.closed if inwards else arm.opened
+        self.data.qpos[arm.finger_qpos] = arm.finger_open + inwards * arm.finger_inwards
+
+    def advance_obstacles(self, seconds: float, motion: float) -> None:
+        """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""
+        if self.obstacles.intruders:
+            self.obstacles.advance(seconds, motion, self._near.has_room)
+
+    def nearest_obstacle(self) -> float:
+        """Smallest distance [m] of the robot, or of what it holds, to an obstacle in this episode; infinite if none."""
+        if not self.obstacles.intruders:
+            return math.inf
+        return self._near.smallest(self.obstacles.active, self._touching)
+
+    def step(self, action: np.ndarray, full: np.ndarray, bound: float, substeps: int) -> int:
+        """Hold an action for some physics steps; -1, or the index of an entry that is not finite, without a step.
+
+        Args:
+            action: (n_arms * (dof + 1),) per arm its joints, then its gripper.
+            full: (n_arms, dof) joint speeds [rad/s] of an entry 1.
+            bound: entries are clipped to plus and minus this.
+            substeps: physics steps.
+        """
+        bad = command(action, full, bound, self._servos, self._grips, self._ctrl)
+        if bad < 0:
+            mujoco.mj_step(self.model, self.data, substeps)
+        return bad
+
+    def held(self) -> np.ndarray:
+        """(n_arms, n_objects) what the fingers of each arm touched in the state that was read last."""
+        fingers = FINGERS + 2 * np.arange(len(self._servos))
+        return self._touching[fingers, FIRST_OBJECT:] != 0.0
+
+    def widest_opening(self, index: int) -> float:
+        """Gap between the finger pads of an open gripper [m]."""
+        return self._widest[index]
+
+    def read(self) -> State:
+        """The state now, in new arrays."""
+        (count, dof), objects = self._servos.shape, len(self._object_index)
+        q, qdot, tcp, opening = np.empty((count, dof)), np.empty((count, dof)), np.empty((count, 7)), np.empty(count)
+        poses, velocities = np.empty((objects, 7)), np.empty((objects, 3))
+        geoms = self.data.contact.geom.copy()  # no view: of one contact it is another type, to be compiled anew
+        qpos, qvel, *frames = self._views
+        read_arms(qpos, qvel, *frames, self._chains, self._frames, self._arm_index, self._homes, q, qdot, tcp, opening)
+        read_objects(qpos, qvel, self._object_index, geoms, self.scene.owner, poses, velocities, self._touching)
+        beads = qpos[self.scene.beads] if len(self.scene.beads) else self._no_beads
+        return State(q, qdot, tcp, opening, poses, velocities, self._touching, beads)
+
+    def contact_name(self, pair: tuple[int, int]) -> str:
+        """Name of a contact of two owners, as in `link5-block1`."""
+        geoms = self.data.contact.geom
+        owners = np.sort(self.scene.owner[geoms], axis=1)
+        hit = np.flatnonzero((owners == pair).all(axis=1))[0]
+        return "-".join(sorted(self.scene.labels[geom] for geom in geoms[hit]))
+
+    def _pad_distance(self, arm: ArmIndex) -> float:
+        left, right = self.data.geom_xpos[arm.pads[0]], self.data.geom_xpos[arm.pads[1]]
+        closing = self.data.site_xmat[arm.site][::3]
+        return abs(float((left - right) @ closing))
+
+    def _measured_opening(self, arm: ArmIndex) -> float:
+        """Gap of the open pads [m]; leaves the grippers open in the state."""
+        mujoco.mj_resetData(self.model, self.data)
+        for each in self.scene.arms:
+            self.data.qpos[each.finger_qpos] = each.finger_open
+        mujoco.mj_forward(self.model, self.data)
+        return mujoco.mj_geomDistance(self.model, self.data, *arm.pads, 1.0, None)

@@ -1,0 +1,116 @@
+"""Tcp twists as actions: joint speeds that the motors can follow, and commands that make the servos do so."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from ...planner.control.linear import backward_solve, cholesky, forward_solve, gram
+from ...planner.geometry.pose import Pose
+from ...planner.jit import kernel
+from ..scene.servos import DAMPING, STIFFNESS
+from .simulation import Simulation
+
+MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
+"""Tcp speeds [m/s, rad/s] of a full `ee_twist` action."""
+LEAST_SQUARES_DAMPING = 0.02
+TORQUE_SHARE = 0.7
+"""Of the motors' torque limits, what changes of speed may ask for; the rest is for what the servos correct."""
+FACTOR, SOLUTION = 6, 12
+"""Rows of the workspace after the six of the Gram matrix."""
+
+
+class TwistDrive:
+    """Makes the servos' commands of tcp twists.
+
+    Twists change at once, joints do not. If each motor went at its torque limit for as long as it needs, the hand would
+    be thrown off by centimeters, and each command that is felt 0.1 s late makes a fast policy sway about its goal.
+    Therefore all joints of an arm make the same share of a change that is too fast for one of them, and the commands
+    make up for the servos' lag and the arm's inertia.
+
+    Args:
+        simulation: whose working arms are driven.
+        dt: seconds between actions.
+    """
+
+    def __init__(self, simulation: Simulation, dt: float):
+        self._sim, self._arms, self._dt = simulation, simulation.scene.arms, dt
+        self._speeds = np.zeros((len(self._arms), self._arms[0].arm.dof))
+        self._changes = np.zeros_like(self._speeds)
+        self._wanted = np.zeros(self._arms[0].arm.dof)
+        self._inertia = np.zeros((simulation.model.nv, simulation.model.nv))
+        self._torques = [simulation.model.actuator_forcerange[index.ctrl, 1].copy() for index in self._arms]
+        self._work = np.zeros((SOLUTION + 1, 6))
+
+    def reset(self) -> None:
+        """All joints are at rest."""
+        self._speeds[:] = self._changes[:] = 0.0
+
+    def commands(self, twists: np.ndarray) -> np.ndarray:
+        """Rates (n_arms, dof) [rad/s] of the servos' set points until the next action; see `_followed`.
+
+        Args:
+            twists: (n_arms, 6) linear and angular parts in world axes, as shares of the largest ones.
+        """
+        data, rates = self._sim.data, np.empty_like(self._speeds)
+        mujoco.mj_fullM(self._sim.model, self._inertia, data.qM)
+        for k, (index, twist) in enumerate(zip(self._arms, twists, strict=True)):
+            x, jacobian = index.arm.fk_jacobian(data.qpos[index.qpos])
+            _resolved(jacobian, Pose(x).rotation, twist, index.arm.velocity_limits, self._work, self._wanted)
+            mine = self._inertia, index.qvel, self._torques[k]
+            _followed(self._wanted, *mine, self._dt, self._speeds[k], self._changes[k], rates[k])
+        return rates
+
+
+# compiled not for speed alone: NumPy's linear algebra depends, in the last digit, on the number of threads
+
+
+@kernel
+def _resolved(jacobian, rotation, twist, limits, work, speeds):
+    """Joint speeds (dof,) of a twist (6,), by damped least squares on the body Jacobian, within the arm's limits."""
+    n, b = len(speeds), work[SOLUTION]
+    for i in range(3):
+        linear, angular = 0.0, 0.0
+        for k in range(3):
+            linear += rotation[k, i] * twist[k]
+            angular += rotation[k, i] * twist[3 + k]
+        b[i], b[3 + i] = MAX_LINEAR * linear, MAX_ANGULAR * angular
+    gram(jacobian, 0, n, work, 0)
+    cholesky(work, 0, LEAST_SQUARES_DAMPING**2, work, FACTOR)
+    forward_solve(work, FACTOR, b)
+    backward_solve(work, FACTOR, b)
+    worst = 1.0
+    for j in range(n):
+        s = 0.0
+        for k in range(6):
+            s += jacobian[k, j] * b[k]
+        speeds[j] = s
+        worst = max(worst, abs(s) / limits[j])
+    for j in range(n):
+        speeds[j] /= worst
+
+
+@kernel
+def _followed(wanted, inertia, dofs, torques, dt, speeds, changes, rates):
+    """Bring the speeds (dof,) as near to the wanted ones as the motors can within dt, and the rates that do so.
+
+    A servo's torque is stiffness (set point - q - lag q'), so that q' changes evenly from v to v + c within dt if the
+    set point's rate is v + c / 2 + lag c / dt + M (c - c_before) / (stiffness dt^2), M the arm's inertia.
+    """
+    n, worst = len(speeds), 1.0
+    for i in range(n):
+        s = 0.0
+        for j in range(n):
+            s += inertia[dofs[i], dofs[j]] * (wanted[j] - speeds[j])
+        worst = max(worst, abs(s) / (TORQUE_SHARE * dt * torques[i]))
+    for i in range(n):
+        s = 0.0
+        for j in range(n):
+            s += inertia[dofs[i], dofs[j]] * ((wanted[j] - speeds[j]) / worst - changes[j])
+        rates[i] = s / (STIFFNESS * torques[i] * dt**2)
+    for i in range(n):
+        change = (wanted[i] - speeds[i]) / worst
+        rates[i] += speeds[i] + (0.5 + DAMPING / dt) * change
+        changes[i] = change
+    for i in range(n):
+        speeds[i] += changes[i]

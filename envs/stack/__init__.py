@@ -1,0 +1,1 @@
+"""Stacking blocks, and its single motions."""

@@ -1,0 +1,123 @@
+"""Where things stand at the start of an episode: levels as data, seeded layouts as pure functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...planner.errors import BadOption
+
+BASE_PLACE = (0.10, 0.0)
+"""Nominal place [m] of the stack on the table."""
+SPACING, ROW_X = 0.22, (-0.08, -0.22)
+"""Distance of blocks in a row and x of the first and second row [m]; three blocks fill a row."""
+BLOCK_GAP, BASE_GAP = 0.12, 0.17
+"""Least distance of block centers to each other and to the base place [m]."""
+REACH = (0.32, 0.70)
+"""Distance of blocks from the arm's base axis [m]: what a Panda reaches with a level hand."""
+TABLE_EDGE = 0.36
+"""Largest |x| and |y| of a block's center on the table [m]."""
+LONG_GAP = 0.30
+"""Of blocks to the base place where there are obstacles [m]: a shorter way has no room for one beside a hand."""
+MAX_TRIES = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """How far a layout may differ from the nominal one.
+
+    Attributes:
+        block: largest shift of a block in x and in y [m].
+        base: largest shift of the base place in x and in y [m].
+        yaw: largest turn of blocks and base place [rad].
+        joints: largest change of a start joint [rad].
+    """
+
+    block: float
+    base: float
+    yaw: float
+    joints: float
+
+
+RANGES = {
+    "L0": Ranges(0.0, 0.0, 0.0, 0.0),
+    "L1": Ranges(0.10, 0.05, np.deg2rad(30.0), 0.05),
+    "L2": Ranges(0.20, 0.10, np.deg2rad(120.0), 0.15),
+}
+"""By the name of a layout, see `levels`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A start.
+
+    Attributes:
+        blocks: (n, 3) x, y [m] and yaw [rad].
+        base: (3,) x, y [m] and yaw [rad] of the place of the stack.
+        joints: (n_arms, dof) offsets from the home joints [rad].
+    """
+
+    blocks: np.ndarray
+    base: np.ndarray
+    joints: np.ndarray
+
+
+def nominal_blocks(count: int) -> np.ndarray:
+    """(count, 2) places of the blocks at level L0 [m]."""
+    order = (-1.0, 0.0, 1.0)
+    return np.array([[ROW_X[k // 3], SPACING * order[k % 3]] for k in range(count)])
+
+
+def stack_layout(
+    rng: np.random.Generator,
+    ranges: Ranges,
+    count: int,
+    arm_axis: np.ndarray,
+    joints: tuple[int, ...],
+    base_gap: float = BASE_GAP,
+    reach: tuple[float, float] = REACH,
+) -> Layout:
+    """A layout of blocks and base place by rejection: independent of any method.
+
+    Args:
+        rng: source of randomness.
+        ranges: how far it may differ from the nominal one.
+        count: number of blocks.
+        arm_axis: (2,) x, y of the arm's base axis [m].
+        joints: shape (n_arms, dof) of the start joints.
+        base_gap: least distance of the blocks to the base place [m].
+        reach: least and largest distance of the blocks from the arm's axis [m].
+
+    Raises:
+        BadOption: no layout was found in a bounded number of tries.
+    """
+    offsets = rng.uniform(-ranges.joints, ranges.joints, joints)
+    nominal = nominal_blocks(count)
+    for _ in range(MAX_TRIES):
+        places = nominal + rng.uniform(-ranges.block, ranges.block, (count, 2))
+        base = np.array(BASE_PLACE) + rng.uniform(-ranges.base, ranges.base, 2)
+        if fits(places, base, arm_axis, base_gap, reach):
+            yaws = rng.uniform(-ranges.yaw, ranges.yaw, count + 1)
+            blocks = np.column_stack([places, yaws[:count]])
+            return Layout(blocks, np.append(base, yaws[count]), offsets)
+    raise BadOption("n_blocks", f"{count} blocks do not fit on the table at this level")
+
+
+def fits(
+    places: np.ndarray,
+    base: np.ndarray,
+    arm_axis: np.ndarray,
+    base_gap: float = BASE_GAP,
+    reach: tuple[float, float] = REACH,
+) -> bool:
+    """The blocks (n, 2) keep their distances to each other, to the base place (2,) and to the arm's axis."""
+    away = np.linalg.norm(places - arm_axis, axis=1)
+    between = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
+    return bool(
+        (away >= reach[0]).all()
+        and (away <= reach[1]).all()
+        and (np.abs(places) <= TABLE_EDGE).all()
+        and (between >= BLOCK_GAP).all()
+        and (np.linalg.norm(places - base, axis=1) >= base_gap).all()
+    )

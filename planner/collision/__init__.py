@@ -1,0 +1,1 @@
+"""Distance queries and proofs that a motion is clear."""

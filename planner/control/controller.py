@@ -1,0 +1,307 @@
+"""The kinematic controller: from the measured joints and a target pose to joint velocities.
+
+Two laws give a task matrix M (6, dof) and a task velocity b (6) with `M qdot = b`:
+
+- `log` (default): `J_b qdot = gain * 2 log(x_m* x_d)`. The tcp moves exactly along the screw to the target
+  and every component of the error decays as exp(-gain t).
+- `paper`: `N qdot = gain * vec(1 - x_m* x_d)` with `N = H-(x_d) C8 J8`. The paper prints the opposite sign,
+  with which the arm runs away. N is 8 x dof of rank 6: with `A = Q R`, `N = A J_b`, it is solved as
+  `(R J_b) qdot = gain * Q^T vec e`, which is the same pseudo-inverse without the two zero singular values.
+
+Both end in `qdot = z + M^T (M M^T + mu^2 I)^-1 (b - M z)`: damped least squares of the task, with a pull z to the
+middle of the joint ranges projected on the null space. Near a singularity, where damping would let the projection
+leak, z fades out. Then the limits: a joint that would pass its position limit is held at the allowed speed and the
+others take over, then all speeds are scaled together. (Not in the paper: a joint that is stopped alone bends the
+path; see Flacco, De Luca and Khatib 2012.)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import BadOption
+from ..geometry import screw
+from ..geometry.pose import Pose
+from ..jit import kernel
+from ..robot.arm import Arm
+from .arm_arrays import (
+    BASIS,
+    CONTROL,
+    FACTOR,
+    GRAM,
+    JACOBIAN,
+    LIMITS,
+    NEED,
+    NULL,
+    SCRATCH,
+    SOLUTION,
+    TASK,
+    bound,
+    pose_and_jacobian,
+)
+from .linear import backward_solve, cholesky, forward_solve, gram, smallest_singular_bound
+
+LAWS = ("log", "paper")
+SIGN_HYSTERESIS = 0.1
+"""Scalar part of the error beyond which the controller changes to the other way round."""
+LEAST_DAMPING = 1e-12
+"""Squared damping that keeps a rank-deficient task solvable."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerSettings:
+    """Gains and bounds of the controller.
+
+    Attributes:
+        law: "log" or "paper".
+        gain: lambda [1/s]; gain * dt must stay below 1.
+        max_linear: largest speed of the tcp [m/s]; the whole twist is scaled.
+        max_angular: largest turning speed of the tcp [rad/s].
+        damping_threshold: singular value of the Jacobian below which damping sets in.
+        max_damping: damping mu at a singularity.
+        null_gain: pull to the middle of the joint ranges [1/s], in the null space of the task.
+        limit_gain: approach to a joint limit is at most this times the distance to it [1/s].
+    """
+
+    law: str = "log"
+    gain: float = 15.0
+    max_linear: float = 0.25
+    max_angular: float = 1.2
+    damping_threshold: float = 0.03
+    max_damping: float = 0.05
+    null_gain: float = 0.5
+    limit_gain: float = 20.0
+
+    def __post_init__(self):
+        if self.law not in LAWS:
+            raise BadOption("law", f"{self.law!r} is not one of {', '.join(LAWS)}")
+        for name in ("gain", "max_linear", "max_angular", "limit_gain"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
+        for name in ("damping_threshold", "max_damping", "null_gain"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise BadOption(name, f"{getattr(self, name)} is not a number >= 0")
+
+    def packed(self) -> tuple[float, ...]:
+        """The settings as the kernels take them: the law as a number, then the others in order."""
+        return (float(LAWS.index(self.law)), *(float(value) for value in astuple(self)[1:]))
+
+
+@kernel
+def _log_task(n, error, gain, work):
+    """Task of the log law."""
+    xi = screw.twist_along(error)
+    for k in range(6):
+        work[NEED, k] = gain * xi[k]
+        for j in range(n):
+            work[TASK + k, j] = work[JACOBIAN + k, j]
+
+
+@kernel
+def _paper_task(n, error, gain, work):
+    """Task of the corrected paper law, both sides times two so that M is near J_b for small errors.
+
+    Under a body twist xi, `vec(d(1 - x_e)/dt) = vec(xi x_e) / 2`, so the columns of -2 A are `vec(xi_k x_e)`.
+    """
+    basis = work[BASIS : BASIS + 6]
+    for k in range(6):
+        v = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+        w = (1.0 if k == 3 else 0.0, 1.0 if k == 4 else 0.0, 1.0 if k == 5 else 0.0)
+        column = screw.mul((0.0, w[0], w[1], w[2], 0.0, v[0], v[1], v[2]), error)
+        for j in range(8):
+            basis[k, j] = -column[j]
+    gram(basis, 0, 8, work, GRAM)
+    cholesky(work, GRAM, 0.0, work, FACTOR)
+    for k in range(6):
+        need = 0.0
+        for j in range(8):
+            need += basis[k, j] * ((1.0 if j == 0 else 0.0) - error[j])
+        work[NEED, k] = 2.0 * gain * need
+        for j in range(n):
+            s = 0.0
+            for i in range(k, 6):
+                s += work[FACTOR + i, k] * work[JACOBIAN + i, j]
+            work[TASK + k, j] = s
+    forward_solve(work, FACTOR, work[NEED])
+
+
+@kernel
+def _cap_twist(law, max_linear, max_angular, work):
+    """Scale the task velocity so that the twist it asks for stays within both bounds."""
+    twist = work[SCRATCH]
+    for k in range(6):
+        twist[k] = work[NEED, k]
+    if law == 1.0:
+        backward_solve(work, FACTOR, twist)  # b = R xi; `_paper_task` left the factor R^T behind
+    v = math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
+    w = math.sqrt(twist[3] ** 2 + twist[4] ** 2 + twist[5] ** 2)
+    scale = min(1.0, max_linear / max(v, 1e-300), max_angular / max(w, 1e-300))
+    for k in range(6):
+        work[NEED, k] *= scale
+
+
+@kernel
+def _factor_task(n, threshold, largest, work):
+    """Factor `M M^T + mu^2 I`; returns the bound of M's sixth singular value, 0 if M is rank-deficient."""
+    gram(work, TASK, n, work, GRAM)
+    sigma = 0.0
+    if cholesky(work, GRAM, 0.0, work, FACTOR):
+        sigma = smallest_singular_bound(work, FACTOR, work[SCRATCH])
+    if sigma < threshold:
+        ratio = sigma / threshold
+        cholesky(work, GRAM, (1.0 - ratio * ratio) * largest * largest + LEAST_DAMPING, work, FACTOR)
+    return sigma
+
+
+@kernel
+def _middle_pull(n, q, gain, work):
+    """Pull of every joint to the middle of its range, none for a continuous joint."""
+    for i in range(n):
+        low, high = work[LIMITS, i], work[LIMITS + 1, i]
+        span = high - low
+        work[NULL, i] = -gain * (q[i] - 0.5 * (low + high)) / span**2 if span < 1e300 else 0.0
+
+
+@kernel
+def _least_squares(n, work, qdot):
+    """`z + M^T (M M^T + mu^2 I)^-1 (b - M z)` with what is ready in the workspace."""
+    b, z = work[SOLUTION], work[NULL]
+    for k in range(6):
+        s = work[NEED, k]
+        for j in range(n):
+            s -= work[TASK + k, j] * z[j]
+        b[k] = s
+    forward_solve(work, FACTOR, b)
+    backward_solve(work, FACTOR, b)
+    for j in range(n):
+        s = z[j]
+        for k in range(6):
+            s += work[TASK + k, j] * b[k]
+        qdot[j] = s
+
+
+@kernel
+def _allowed(q, i, gain, work):
+    """Lowest and highest speed that joint i may have for the sake of its position limits."""
+    return -gain * (q[i] - work[LIMITS, i]), gain * (work[LIMITS + 1, i] - q[i])
+
+
+@kernel
+def _worst_joint(n, q, gain, work, qdot):
+    """The joint that exceeds its position bound most, and the speed it is allowed; -1 if there is none."""
+    worst, excess, speed = -1, 1e-12, 0.0
+    for i in range(n):
+        low, high = _allowed(q, i, gain, work)
+        if qdot[i] - high > excess:
+            worst, excess, speed = i, qdot[i] - high, high
+        if low - qdot[i] > excess:
+            worst, excess, speed = i, low - qdot[i], low
+    return worst, speed
+
+
+@kernel
+def _hold_joints(n, q, threshold, largest, gain, work, qdot):
+    """Hold joints at their bounds, at most dof - 6 of them, and let the others do the whole task."""
+    held = work[NULL]
+    for i in range(n):
+        held[i] = 0.0
+    for _ in range(n - 6):
+        joint, speed = _worst_joint(n, q, gain, work, qdot)
+        if joint < 0:
+            return
+        for k in range(6):
+            work[NEED, k] -= work[TASK + k, joint] * speed
+            work[TASK + k, joint] = 0.0
+        # a joint without a column keeps its z
+        held[joint] = speed
+        _factor_task(n, threshold, largest, work)
+        _least_squares(n, work, qdot)
+
+
+@kernel
+def _scale_to_limits(n, q, gain, work, qdot):
+    """Scale all speeds together so that no joint exceeds its speed or its approach to a position limit."""
+    scale = 1.0
+    for i in range(n):
+        low, high = _allowed(q, i, gain, work)
+        speed = qdot[i]
+        if abs(speed) > work[LIMITS + 2, i]:
+            scale = min(scale, work[LIMITS + 2, i] / abs(speed))
+        if speed > 0.0 and speed > high:
+            scale = min(scale, max(high, 0.0) / speed)
+        if speed < 0.0 and speed < low:
+            scale = min(scale, min(low, 0.0) / speed)
+    for i in range(n):
+        qdot[i] *= scale
+
+
+@kernel
+def choose_sign(error, sign):
+    """The way round: the shorter one at first (sign 0), then kept until it is clearly the longer one."""
+    if sign == 0.0:
+        return 1.0 if error[0] >= 0.0 else -1.0
+    return -sign if error[0] * sign < -SIGN_HYSTERESIS else sign
+
+
+@kernel
+def joint_velocity(work, q, error, qdot):
+    """Joint speeds towards the target; the body Jacobian at q is ready in the workspace.
+
+    Args:
+        work: see `workspace.bound`.
+        q: (dof,) joints that the error belongs to.
+        error: x_m* x_d as a tuple, its sign chosen.
+        qdot: (dof,) result.
+    """
+    law, gain, threshold, largest = work[CONTROL, 0], work[CONTROL, 1], work[CONTROL, 4], work[CONTROL, 5]
+    null_gain, limit_gain = work[CONTROL, 6], work[CONTROL, 7]
+    n = len(q)
+    if law == 0.0:
+        _log_task(n, error, gain, work)
+    else:
+        _paper_task(n, error, gain, work)
+    _cap_twist(law, work[CONTROL, 2], work[CONTROL, 3], work)
+    sigma = _factor_task(n, threshold, largest, work)
+    fade = min(1.0, max(0.0, sigma - threshold) / max(threshold, 1e-9))
+    _middle_pull(n, q, null_gain * fade if n > 6 else 0.0, work)
+    _least_squares(n, work, qdot)
+    _hold_joints(n, q, threshold, largest, limit_gain, work, qdot)
+    _scale_to_limits(n, q, limit_gain, work, qdot)
+
+
+@kernel
+def tick(work, q, target, sign, qdot):
+    """One control step: joint speeds from q towards the target (8,); returns the way round taken."""
+    x = pose_and_jacobian(work, q)
+    goal = (target[0], target[1], target[2], target[3], target[4], target[5], target[6], target[7])
+    error = screw.mul(screw.conj(x), goal)
+    sign = choose_sign(error, sign)
+    joint_velocity(work, q, screw.neg(error) if sign < 0.0 else error, qdot)
+    return sign
+
+
+class Controller:
+    """The control law bound to an arm: joint speeds from joint positions and a target pose.
+
+    It remembers which way round it turns (the double cover), with hysteresis; `reset` forgets it.
+    """
+
+    def __init__(self, arm: Arm, settings: ControllerSettings | None = None):
+        self.arm = arm
+        self.settings = settings or ControllerSettings()
+        self._work = bound(arm, self.settings.packed())
+        self._sign = 0.0
+
+    def reset(self) -> None:
+        """Forget which way round was taken."""
+        self._sign = 0.0
+
+    def __call__(self, q: ArrayLike, target: Pose) -> np.ndarray:
+        """Joint speeds (dof,) [rad/s] at joints q (dof,) towards the target pose of the tcp."""
+        qdot = np.empty(self.arm.dof)
+        self._sign = tick(self._work, np.asarray(q, dtype=np.float64), target.dq, self._sign, qdot)
+        return qdot

@@ -1,0 +1,1 @@
+"""Escape trees of tangent planes (the paper, section III-C and algorithm 2)."""

@@ -1,0 +1,1 @@
+"""Poses, dual quaternions, screws and convex shapes."""

@@ -1,0 +1,325 @@
+"""Unit dual quaternions on arrays `(..., 8)`: primary wxyz, dual wxyz; products are compositions of poses.
+
+All functions broadcast over leading axes and return new float64 arrays. x and -x are the same pose; each
+function says what it does with the sign. Logarithm, power and interpolation are the screw versions: rotation
+and translation move together along one axis. (DQ Robotics' `log` and `pow` move them apart: see
+`decoupled_lerp`.) Conventions: method reference section 1, twists `(v, omega)` in the body frame.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import BadShape, NotFinite, NotUnit
+from ..jit import kernel
+from . import screw
+
+Array = np.ndarray
+CONJUGATE_8 = np.diag([1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0])
+CONJUGATE_8.flags.writeable = False
+UNIT_TOLERANCE = 1e-6
+ON_MANIFOLD = 1e-14
+"""Deviation from a unit dual quaternion that is rounding and nothing else."""
+
+
+class ScrewParameters(NamedTuple):
+    """The screw of a displacement (Chasles): turn by `angle` about an axis and slide by `travel` along it.
+
+    Attributes:
+        axis: (3,) unit direction; zero for the identity.
+        moment: (3,) moment of the axis about the origin [m]; zero for a pure translation.
+        angle: rotation [rad] in [0, pi].
+        travel: translation along the axis [m]; the whole translation if angle = 0.
+    """
+
+    axis: Array
+    moment: Array
+    angle: float
+    travel: float
+
+    @property
+    def point(self) -> Array:
+        """(3,) point of the axis that is closest to the origin [m]."""
+        return np.cross(self.axis, self.moment)
+
+    @property
+    def pitch(self) -> float:
+        """Travel per radian [m/rad]; infinite for a pure translation."""
+        return self.travel / self.angle if self.angle > 0 else math.inf
+
+
+def _rows(name: str, value: ArrayLike, width: int) -> Array:
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != width:
+        raise BadShape(name, array.shape, f"(..., {width})")
+    return array
+
+
+def _flat(array: Array, shape: tuple[int, ...], width: int) -> Array:
+    spread = array if array.shape == (*shape, width) else np.broadcast_to(array, (*shape, width))
+    return np.ascontiguousarray(spread.reshape(-1, width))
+
+
+@kernel
+def _mul_rows(a, b, out):
+    for i in range(len(out)):
+        screw.store8(out, i, screw.mul(screw.load8(a, i), screw.load8(b, i)))
+
+
+@kernel
+def _sclerp_rows(a, b, tau, shortest, out):
+    for i in range(len(out)):
+        x = screw.load8(a, i)
+        z = screw.mul(screw.conj(x), screw.load8(b, i))
+        xi = screw.twist_of(z) if shortest else screw.twist_along(z)
+        screw.store8(out, i, screw.mul(x, screw.from_twist(screw.scaled(xi, tau[i]))))
+
+
+@kernel
+def _twist_rows(x, out):
+    for i in range(len(out)):
+        xi = screw.twist_of(screw.load8(x, i))
+        for k in range(6):
+            out[i, k] = xi[k]
+
+
+@kernel
+def _exp_rows(xi, out):
+    for i in range(len(out)):
+        t = (xi[i, 0], xi[i, 1], xi[i, 2], xi[i, 3], xi[i, 4], xi[i, 5])
+        screw.store8(out, i, screw.from_twist(t))
+
+
+@kernel
+def _normalize_rows(x, out):
+    for i in range(len(out)):
+        screw.store8(out, i, screw.normalized(screw.load8(x, i)))
+
+
+@kernel
+def _from_pose_rows(p, r, out):
+    for i in range(len(out)):
+        screw.store8(out, i, screw.from_pose((p[i, 0], p[i, 1], p[i, 2]), (r[i, 0], r[i, 1], r[i, 2], r[i, 3])))
+
+
+@kernel
+def _translation_rows(x, out):
+    for i in range(len(out)):
+        t = screw.translation(screw.load8(x, i))
+        for k in range(3):
+            out[i, k] = t[k]
+
+
+def _mapped(rows, x: ArrayLike, width_in: int, width_out: int, name: str) -> Array:
+    array = _rows(name, x, width_in)
+    out = np.empty((array.size // width_in, width_out))
+    rows(_flat(array, array.shape[:-1], width_in), out)
+    return out.reshape(*array.shape[:-1], width_out)
+
+
+def identity() -> Array:
+    """(8,) dual quaternion of no displacement."""
+    return np.array(screw.IDENTITY)
+
+
+def mul(a: ArrayLike, b: ArrayLike) -> Array:
+    """Product of dual quaternions (..., 8), the composition of poses: `world_from_b` times `b_from_c`."""
+    a, b = _rows("a", a, 8), _rows("b", b, 8)
+    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    out = np.empty((math.prod(shape), 8))
+    _mul_rows(_flat(a, shape, 8), _flat(b, shape, 8), out)
+    return out.reshape(*shape, 8)
+
+
+def conj(x: ArrayLike) -> Array:
+    """Conjugate (..., 8), the inverse of a unit dual quaternion."""
+    return _rows("dual quaternion", x, 8) * np.diag(CONJUGATE_8)
+
+
+def normalized(x: ArrayLike) -> Array:
+    """Nearest unit dual quaternion (..., 8); the sign is kept."""
+    return _mapped(_normalize_rows, x, 8, 8, "dual quaternion")
+
+
+def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
+    """The input as float64 (..., 8), projected to the manifold if it is unit up to rounding.
+
+    What is unit to the last digits is left alone, so that checking twice changes no bit.
+
+    Raises:
+        BadShape, NotFinite, NotUnit: the input is not a unit dual quaternion within 1e-6.
+    """
+    array = _rows(name, x, 8)
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        raise NotFinite(name, tuple(int(k) for k in bad[0]))
+    norms = np.linalg.norm(array[..., :4], axis=-1)
+    worst = np.abs(norms - 1.0).argmax() if norms.size else None
+    if worst is not None and abs(norms.flat[worst] - 1.0) > UNIT_TOLERANCE:
+        raise NotUnit(name, float(norms.flat[worst]))
+    slant = np.abs(np.sum(array[..., :4] * array[..., 4:], axis=-1))
+    if slant.size and slant.max() > UNIT_TOLERANCE * (1.0 + np.abs(array[..., 4:]).max()):
+        raise NotUnit(
+            f"{name}, whose dual part is not orthogonal to its primary part,", float(np.sqrt(1 + slant.max()))
+        )
+    off = (np.abs(norms - 1.0) > ON_MANIFOLD) | (slant > ON_MANIFOLD)
+    return np.where(off[..., None], normalized(array), array) if off.any() else array
+
+
+def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:
+    """Unit dual quaternion (..., 8) of positions (..., 3) [m] and unit quaternions (..., 4), wxyz."""
+    p, r = _rows("position", position, 3), _rows("quaternion", wxyz, 4)
+    shape = np.broadcast_shapes(p.shape[:-1], r.shape[:-1])
+    out = np.empty((math.prod(shape), 8))
+    _from_pose_rows(_flat(p, shape, 3), _flat(r, shape, 4), out)
+    return out.reshape(*shape, 8)
+
+
+def translation(x: ArrayLike) -> Array:
+    """Positions (..., 3) [m]; the sign of x does not matter."""
+    return _mapped(_translation_rows, x, 8, 3, "dual quaternion")
+
+
+def twist_from_dq(x: ArrayLike) -> Array:
+    """Body twist (..., 6), (v, omega), that reaches x in unit time by the shortest screw motion.
+
+    Twice the screw logarithm; equals `pinocchio.log6(M).vector`. At a half turn see `is_half_turn`.
+    """
+    return _mapped(_twist_rows, x, 8, 6, "dual quaternion")
+
+
+def dq_from_twist(twist: ArrayLike) -> Array:
+    """Unit dual quaternion (..., 8) reached by a constant body twist (..., 6), (v, omega), in unit time."""
+    return _mapped(_exp_rows, twist, 6, 8, "twist")
+
+
+def log(x: ArrayLike) -> Array:
+    """Screw logarithm (..., 8), a pure dual quaternion `(0, omega / 2, 0, v / 2)`; sign-free (shortest)."""
+    twist = 0.5 * twist_from_dq(x)
+    zero = np.zeros((*twist.shape[:-1], 1))
+    return np.concatenate([zero, twist[..., 3:], zero, twist[..., :3]], axis=-1)
+
+
+def exp(pure: ArrayLike) -> Array:
+    """Exponential (..., 8) of a pure dual quaternion (..., 8) as `log` gives it."""
+    pure = _rows("pure dual quaternion", pure, 8)
+    return dq_from_twist(2.0 * np.concatenate([pure[..., 5:], pure[..., 1:4]], axis=-1))
+
+
+def power(x: ArrayLike, tau: ArrayLike) -> Array:
+    """Power x^tau (..., 8): the fraction tau of the shortest screw motion to x."""
+    return dq_from_twist(np.asarray(tau, dtype=np.float64)[..., None] * twist_from_dq(x))
+
+
+def sclerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike, *, shortest: bool = True) -> Array:
+    """Screw linear interpolation (..., 8): `start (start* end)^tau`, a constant body twist along tau.
+
+    Args:
+        start: (..., 8) pose at tau = 0.
+        end: (..., 8) pose at tau = 1.
+        tau: (...) fraction; beyond [0, 1] the screw motion goes on.
+        shortest: the shorter of the two ways; False keeps the signs as given (the long way on purpose).
+
+    Paper: section II-A (ScLERP). The "minimum length" it claims does not hold; the equivariance does.
+    """
+    a, b, t = _rows("start", start, 8), _rows("end", end, 8), np.asarray(tau, dtype=np.float64)
+    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1], t.shape)
+    out = np.empty((math.prod(shape), 8))
+    flat_tau = np.ascontiguousarray(np.broadcast_to(t, shape).reshape(-1))
+    _sclerp_rows(_flat(a, shape, 8), _flat(b, shape, 8), flat_tau, shortest, out)
+    return out.reshape(*shape, 8)
+
+
+def is_half_turn(x: ArrayLike) -> Array:
+    """True (...) where both ways round are equally short, so that the sign of the axis is a choice."""
+    return np.abs(_rows("dual quaternion", x, 8)[..., 0]) < screw.HALF_TURN
+
+
+def screw_parameters(x: ArrayLike) -> ScrewParameters:
+    """Screw of one displacement (8,), the shorter way; a pure translation has angle 0 and no moment."""
+    twist = twist_from_dq(x)
+    if twist.shape != (6,):
+        raise BadShape("dual quaternion", np.shape(x), "(8,)")
+    v, omega = twist[:3], twist[3:]
+    angle = float(np.linalg.norm(omega))
+    if angle == 0.0:
+        travel = float(np.linalg.norm(v))
+        return ScrewParameters(v / travel if travel else np.zeros(3), np.zeros(3), 0.0, travel)
+    axis = omega / angle
+    travel = float(axis @ v)
+    return ScrewParameters(axis, (v - travel * axis) / angle, angle, travel)
+
+
+def dq_from_screw_parameters(screw_: ScrewParameters) -> Array:
+    """Displacement (8,) of a screw; inverse of `screw_parameters` up to sign."""
+    half = 0.5 * screw_.angle
+    sine, cosine = math.sin(half), math.cos(half)
+    dual = screw_.moment * sine + 0.5 * screw_.travel * cosine * screw_.axis
+    return np.concatenate([[cosine], sine * screw_.axis, [-0.5 * screw_.travel * sine], dual])
+
+
+def hamilton_plus(a: ArrayLike) -> Array:
+    """Matrix H+ (8, 8) of the product from the left, `vec(a b) = H+(a) vec(b)`."""
+    return _hamilton(a, 1.0)
+
+
+def hamilton_minus(b: ArrayLike) -> Array:
+    """Matrix H- (8, 8) of the product from the right, `vec(a b) = H-(b) vec(a)`."""
+    return _hamilton(b, -1.0)
+
+
+def _hamilton(x: ArrayLike, sign: float) -> Array:
+    def block(w: float, i: float, j: float, k: float) -> Array:
+        s = sign
+        return np.array([[w, -i, -j, -k], [i, w, -s * k, s * j], [j, s * k, w, -s * i], [k, -s * j, s * i, w]])
+
+    x = _rows("dual quaternion", x, 8)
+    out = np.zeros((8, 8))
+    out[:4, :4] = out[4:, 4:] = block(*x[:4])
+    out[4:, :4] = block(*x[4:])
+    return out
+
+
+def pose_error(current: ArrayLike, target: ArrayLike) -> Array:
+    """Distance (...) between poses, `min(|1 - c*x|, |1 + c*x|)` in R^8.
+
+    Zero iff the poses are the same, left-invariant, blind to signs.
+    Not in the paper: it prints the norm of a pair of vectors, which depends on the world origin and the sign.
+    """
+    z = mul(conj(current), target)
+    one = identity()
+    return np.minimum(np.linalg.norm(one - z, axis=-1), np.linalg.norm(one + z, axis=-1))
+
+
+def gap(current: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:
+    """Distance of the origins (...) [m] and angle of rotation (...) [rad] between poses; sign-free."""
+    z = mul(conj(current), target)
+    angle = 2.0 * np.arctan2(np.linalg.norm(z[..., 1:4], axis=-1), np.abs(z[..., 0]))
+    return np.linalg.norm(translation(z), axis=-1), angle
+
+
+def continuous(path: ArrayLike) -> Array:
+    """Path (n, 8) with signs flipped so that neighbors lie on the same side of the double cover."""
+    path = _rows("path", path, 8)
+    if len(path) < 2:
+        return path.copy()
+    turns = np.where(np.sum(path[1:, :4] * path[:-1, :4], axis=1) < 0.0, -1.0, 1.0)
+    return path * np.concatenate([[1.0], np.cumprod(turns)])[:, None]
+
+
+def decoupled_lerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike) -> Array:
+    """Straight line for the position, slerp for the rotation (..., 8), the shorter way.
+
+    Not a screw motion: it changes with the choice of the tool frame. Here to be compared with.
+    """
+    start, end = _rows("start", start, 8), _rows("end", end, 8)
+    tau = np.asarray(tau, dtype=np.float64)
+    a, b = start.copy(), end.copy()
+    a[..., 4:], b[..., 4:] = 0.0, 0.0
+    p, q = translation(start), translation(end)
+    position = p + tau[..., None] * (q - p)
+    return from_position_quaternion(position, sclerp(a, b, tau)[..., :4])

@@ -1,0 +1,1 @@
+"""Demonstrations and the task-space imitation algorithm (the paper, section III)."""

@@ -1,0 +1,88 @@
+"""Cutting a recording into motions, and cleaning what a human hand leaves in them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import BadOption
+from ..geometry import dualquat as dq
+from ..geometry.pose import PosePath
+
+DWELL_SPEED = 0.05
+"""Fraction of the median speed below which the hand rests."""
+DWELL_SECONDS = 0.3
+SAME = 1e-9
+"""Screw length [m] below which two poses are one."""
+
+
+def gripper_events(gripper: np.ndarray) -> np.ndarray:
+    """Last sample (k,) before each change of the gripper command (n,), whose sign counts."""
+    return np.flatnonzero(np.diff(np.sign(gripper)) != 0)
+
+
+def dwells(time: np.ndarray, path: PosePath) -> list[tuple[int, int]]:
+    """Sample ranges, both ends included, in which the hand rests for longer than 0.3 s."""
+    steps = np.diff(path.lengths())
+    speed = steps / np.diff(time)
+    moving = speed[steps > SAME]
+    if not len(moving):
+        return [(0, len(path) - 1)]
+    slow = speed < DWELL_SPEED * np.median(moving)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(int), [0]])))
+    ranges = zip(edges[::2], edges[1::2], strict=True)
+    return [(int(a), int(b)) for a, b in ranges if time[b] - time[a] > DWELL_SECONDS]
+
+
+def resampled(path: PosePath, step: float) -> PosePath:
+    """The path in equal steps of screw length along it, at most `step` [m]; both ends are kept exactly.
+
+    Pauses and trembling no longer weigh in rules that count poses. Poses in between lie on the screw between
+    their two neighbors: nothing is smoothed.
+    """
+    if not step > 0:
+        raise BadOption("step", f"{step} is not a positive length")
+    lengths = path.lengths()
+    keep = np.concatenate([[True], np.diff(lengths) > SAME])
+    poses, known = path.dqs[keep], lengths[keep]
+    if len(poses) == 1:
+        return PosePath(path.dqs[[0, -1]])
+    wanted = np.linspace(0.0, known[-1], int(np.ceil(known[-1] / step)) + 1)
+    left = np.clip(np.searchsorted(known, wanted, side="right") - 1, 0, len(known) - 2)
+    tau = (wanted - known[left]) / (known[left + 1] - known[left])
+    out = dq.sclerp(poses[left], poses[left + 1], tau)
+    out[0], out[-1] = path.dqs[0], path.dqs[-1]
+    return PosePath(out)
+
+
+def key_poses(path: PosePath, count: int) -> PosePath:
+    """So many poses at equal steps of a path's screw length, on the screws between its own; both ends are kept.
+
+    Two of a path that stands still.
+    """
+    if count < 2:
+        raise BadOption("count", f"{count} is not a number of poses from 2 on")
+    lengths = path.lengths()
+    if lengths[-1] <= SAME:
+        return PosePath(path.dqs[[0, -1]])
+    wanted = np.linspace(0.0, lengths[-1], count)
+    left = np.clip(np.searchsorted(lengths, wanted, side="right") - 1, 0, len(path) - 2)
+    tau = (wanted - lengths[left]) / (lengths[left + 1] - lengths[left])
+    poses = dq.sclerp(path.dqs[left], path.dqs[left + 1], np.clip(tau, 0.0, 1.0))
+    poses[0], poses[-1] = path.dqs[0], path.dqs[-1]
+    return PosePath(poses)
+
+
+def trimmed(path: PosePath, radius: float) -> PosePath:
+    """The path up to its first entry into a ball about its last position, then its last pose.
+
+    Cuts what people do at the very end: lowering too far, shifting, rising. Only positions count: the
+    orientation may settle later.
+
+    Args:
+        path: the path.
+        radius: of the ball [m].
+    """
+    positions = path.positions
+    inside = np.linalg.norm(positions - positions[-1], axis=1) <= radius
+    first = int(np.argmax(inside))
+    return path[: first + 1].joined(path[len(path) - 1 :])

@@ -1,0 +1,1 @@
+"""Certificates: an independent check that shares no query with the planner."""

@@ -1,0 +1,239 @@
+"""The judge of plans and executed motions: recomputes all that is claimed of them, by other means.
+
+Distances come from fcl, kinematics from Pinocchio, and what happens between samples from `judge_sweep`. Not judged:
+the arm against itself, whether the capsules hold the true arm, and dynamics.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..log.motion_log import PROBLEM, MotionLog, content_of, digest_of
+from ..robot.body import FRAME
+from .deviation import deviation_of
+from .sweep import Sweep, Sweeper, SweepSettings
+
+FORMAT_VERSION = 1
+POSITION_ERROR, ANGLE_ERROR = 0.005, 0.05
+"""A goal is reached within these [m], [rad], or within the claimed errors if they are smaller."""
+SPEED_EXCESS = 1e-6
+"""Relative; rounding."""
+CLAIM_GAP = 1e-5
+"""A claimed clearance [m] is proven up to this: the last micrometers take too many halvings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What a judge found in a motion.
+
+    Attributes:
+        ok: it is as it must be and as it is claimed to be.
+        reasons: what is wrong, one line each; empty if ok.
+        clearance: smallest distance [m] of the body to the obstacles, between samples too, allowed contacts aside:
+            a certified lower bound (fcl's own rounding, below 1e-7 m, aside), inf if there is nothing to touch.
+        sampled_clearance: smallest distance found [m]; the truth lies between the two.
+        clearances: the certified bound by name of the body's parts.
+        joint_margin: smallest distance to a joint limit [rad or m]; negative outside.
+        speed_ratio: largest joint speed over its limit.
+        position_error: of the last pose to the goal [m]; None: no goal.
+        angle_error: the same [rad].
+        deviation: largest distance (screw length, 0.2 m per rad) of the end of the motion to the demonstrated path
+            [m], both run through in order; None: no path.
+        deviation_gap: the true deviation is smaller by at most this [m].
+        intervals: pairs of a capsule and an obstacle over an interval that were looked at.
+        log_sha256: digest of the log.
+    """
+
+    ok: bool
+    reasons: tuple[str, ...]
+    clearance: float
+    sampled_clearance: float
+    clearances: dict[str, float]
+    joint_margin: float
+    speed_ratio: float
+    position_error: float | None
+    angle_error: float | None
+    deviation: float | None
+    deviation_gap: float
+    intervals: int
+    log_sha256: str
+
+    def to_json(self) -> str:
+        """As JSON; infinite numbers are null."""
+        table = {"format_version": FORMAT_VERSION, **asdict(self)}
+        return json.dumps(_finite(table), allow_nan=False, indent=1)
+
+    def write(self, path: str | Path) -> None:
+        """Write it to a JSON file."""
+        Path(path).write_text(self.to_json() + "\n", encoding="utf-8")
+
+
+def certify(
+    log: MotionLog,
+    *,
+    expected: MotionLog | None = None,
+    tolerance: float = 1e-6,
+    settings: SweepSettings | None = None,
+) -> Certificate:
+    """Judge a motion.
+
+    Args:
+        log: the motion and its claims.
+        expected: a log whose problem (arm, body, obstacles, allowed, goal, safety, and demonstrated if it has one)
+            must be this one's, whatever its own motion; None: the log's problem is taken as it is.
+        tolerance: [m], [rad] by which distances may be too small and claims too good.
+        settings: how closely to look between samples.
+
+    Returns:
+        What was found, in every case: a motion that is refused is no error.
+    """
+    required = _required(log)
+    claimed = log.claims.get("clearance", -math.inf)
+    sweeper = Sweeper(log, required - tolerance, claimed - 0.5 * CLAIM_GAP, settings or SweepSettings())
+    sweep = sweeper.run()
+    errors = _goal_errors(log, sweeper.moment.tool[-1])
+    deviation, gap = None, 0.0
+    if log.demonstrated is not None:
+        deviation, gap = deviation_of(sweeper.kinematics, log)
+    margins = np.minimum(log.joints - log.arm.lower, log.arm.upper - log.joints)
+    checked = np.isfinite(required)
+    certificate = Certificate(
+        ok=False,
+        reasons=(),
+        clearance=_smallest(sweep.certified[checked]),
+        sampled_clearance=_smallest(sweep.sampled[checked]),
+        clearances=_by_name(log, sweep),
+        joint_margin=float(margins.min()),
+        speed_ratio=float(_speed_ratios(log).max(initial=0.0)),
+        position_error=errors[0],
+        angle_error=errors[1],
+        deviation=deviation,
+        deviation_gap=gap,
+        intervals=sweep.intervals,
+        log_sha256=digest_of(log),
+    )
+    reasons = (
+        *_problem_reasons(log, expected),
+        *_motion_reasons(log, margins),
+        *_clearance_reasons(log, sweep, required, tolerance),
+        *_goal_reasons(log, certificate, tolerance),
+        *_claim_reasons(log, certificate, tolerance),
+    )
+    fields = {name: getattr(certificate, name) for name in Certificate.__slots__}
+    return Certificate(**{**fields, "ok": not reasons, "reasons": reasons})
+
+
+def _required(log: MotionLog) -> np.ndarray:
+    """(m, k) distances to keep [m]; -inf for contacts that are allowed, and between what both stand still for ever.
+
+    The base cannot run into an obstacle that does not move: where it stands is not a matter of a motion.
+    """
+    margins = [log.safety if o.margin is None else o.margin for o in log.obstacles]
+    out = np.tile(np.array(margins, dtype=np.float64), (len(log.body), 1))
+    for k, mine in enumerate(log.body.names):
+        for o, obstacle in enumerate(log.obstacles):
+            fixed = log.body.rows[k, FRAME] < 0 and not obstacle.velocity.any()
+            if fixed or (mine, obstacle.name) in log.allowed:
+                out[k, o] = -math.inf
+    return out
+
+
+def _smallest(values: np.ndarray) -> float:
+    return float(values.min(initial=math.inf))
+
+
+def _by_name(log: MotionLog, sweep: Sweep) -> dict[str, float]:
+    names = np.array(log.body.names)
+    return {str(name): _smallest(sweep.certified[names == name]) for name in dict.fromkeys(log.body.names)}
+
+
+def _speed_ratios(log: MotionLog) -> np.ndarray:
+    """(n - 1, dof); inf where a joint moves in no time."""
+    dq, dt = np.abs(np.diff(log.joints, axis=0)), np.diff(log.time)[:, None]
+    ratios = np.where(dq > 0, math.inf, 0.0)
+    return np.divide(dq, dt * log.arm.velocity_limits, out=ratios, where=np.broadcast_to(dt > 0, dq.shape))
+
+
+def _goal_errors(log: MotionLog, world_from_tcp: np.ndarray) -> tuple[float | None, float | None]:
+    if log.goal is None:
+        return None, None
+    turn = world_from_tcp[:3, :3].T @ log.goal.rotation
+    sine = 0.5 * np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    angle = math.atan2(sine, 0.5 * (np.trace(turn) - 1.0))
+    return float(np.linalg.norm(world_from_tcp[:3, 3] - log.goal.position)), angle
+
+
+def _problem_reasons(log: MotionLog, expected: MotionLog | None) -> Iterator[str]:
+    if expected is None:
+        return
+    mine, theirs = content_of(log), content_of(expected)
+    for key in PROBLEM:
+        if mine[key] != theirs[key] and (key != "demonstrated" or theirs[key] is not None):
+            yield f"problem: {key} is not that of the expected problem"
+
+
+def _motion_reasons(log: MotionLog, margins: np.ndarray) -> Iterator[str]:
+    late = np.flatnonzero(np.diff(log.time) <= 0)
+    if len(late):
+        k = late[0]
+        yield f"time: does not rise from {log.time[k]:g} s to {log.time[k + 1]:g} s at index {k + 1}"
+    k, j = np.unravel_index(margins.argmin(), margins.shape)
+    if margins[k, j] < 0:
+        yield f"limits: {log.arm.joint_names[j]} is {-margins[k, j]:.3g} beyond its limit at index {k}"
+    ratios = _speed_ratios(log)
+    if ratios.size and ratios.max() > 1.0 + SPEED_EXCESS:
+        k, j = np.unravel_index(ratios.argmax(), ratios.shape)
+        yield f"speed: {log.arm.joint_names[j]} moves at {ratios[k, j]:.4g} times its limit after index {k}"
+
+
+def _clearance_reasons(log: MotionLog, sweep: Sweep, required: np.ndarray, tolerance: float) -> Iterator[str]:
+    if not sweep.complete:
+        yield f"clearance: undecided after {sweep.intervals} intervals"
+    short = sweep.certified < required - tolerance
+    for name in dict.fromkeys(log.body.names):
+        mine = np.array([name == other for other in log.body.names])
+        for o in np.flatnonzero(short[mine].any(axis=0)):
+            k = np.flatnonzero(mine)[sweep.certified[mine, o].argmin()]
+            low, found = sweep.certified[k, o], sweep.sampled[k, o]
+            state = (
+                f"{found:.6g} m from" if found < required[k, o] - tolerance else f"not proven beyond {low:.6g} m from"
+            )
+            what = f"at least {-found:.4g} m inside" if found < 0 else state
+            where = f"{log.obstacles[o].name or f'obstacle {o}'} at {sweep.when[k, o]:.4g} s"
+            yield f"clearance: {name} is {what} {where}; {required[k, o]:g} m must be kept"
+
+
+def _goal_reasons(log: MotionLog, found: Certificate, tolerance: float) -> Iterator[str]:
+    for key, unit, most in (("position_error", "m", POSITION_ERROR), ("angle_error", "rad", ANGLE_ERROR)):
+        value = getattr(found, key)
+        if value is not None and value > most + tolerance:
+            yield f"goal: {key} is {value:.6g} {unit}; at most {most:g}"
+
+
+def _claim_reasons(log: MotionLog, found: Certificate, tolerance: float) -> Iterator[str]:
+    for key, claimed in log.claims.items():
+        value = getattr(found, key)
+        if value is None:
+            yield f"claims.{key}: {claimed:.6g} is claimed, but the log holds nothing to compare with"
+        elif key == "clearance":
+            if claimed > found.sampled_clearance + tolerance:
+                yield f"claims.clearance: {claimed:.6g} m is claimed, {found.sampled_clearance:.6g} m is the truth"
+            elif claimed > value + CLAIM_GAP:
+                yield f"claims.clearance: {claimed:.6g} m is claimed, only {value:.6g} m is proven"
+        elif key == "joint_margin":
+            if claimed > value + tolerance:
+                yield f"claims.joint_margin: {claimed:.6g} is claimed, {value:.6g} is the truth"
+        elif claimed < value - tolerance - (found.deviation_gap if key == "deviation" else 0.0):
+            yield f"claims.{key}: {claimed:.6g} is claimed, {value:.6g} is the truth"
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,250 @@
+"""How near a moving body comes to moving obstacles, between the samples of its motion too.
+
+Not in the paper. The distance of a capsule to an obstacle changes by no more than the way that the capsule's core
+goes relative to the obstacle. So over an interval with distances D(a) and D(b) at its ends, in which no point of the
+core goes farther than L, the distance is nowhere below (D(a) + D(b) - L) / 2; where that is too little, the
+interval is halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import BadOption
+from ..log.motion_log import MotionLog
+from ..robot.body import FRAME
+from .geometry import Kinematics, Moment, Scene
+
+BATCH = 2048
+"""Intervals worked on at once: bounds the memory."""
+
+
+@dataclass(frozen=True)
+class SweepSettings:
+    """How closely to look.
+
+    Attributes:
+        resolution: an interval in which nothing moves farther [m] is not halved.
+        slack: the bound lies at most this far [m] under the smallest distance found, for every name.
+        max_intervals: halves looked at before giving up.
+    """
+
+    resolution: float = 1e-6
+    slack: float = 5e-4
+    max_intervals: int = 200_000
+
+    def __post_init__(self):
+        for name in ("resolution", "slack", "max_intervals"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise BadOption(name, f"{getattr(self, name)!r} is not a positive number")
+
+
+@dataclass
+class Sweep:
+    """What was found, for every capsule and obstacle (m, k).
+
+    Attributes:
+        sampled: smallest distances looked at [m], or lower bounds of them where another pair is nearer; inf: never.
+        certified: lower bounds of all distances during the motion [m].
+        when: times at which the smallest were found [s].
+        intervals: pairs over an interval that were looked at.
+        complete: the intervals were as many as allowed, or fewer.
+    """
+
+    sampled: np.ndarray
+    certified: np.ndarray
+    when: np.ndarray
+    intervals: int = 0
+    complete: bool = True
+
+
+@dataclass
+class _Batch:
+    """Intervals between moments, the pairs (interval, capsule, obstacle) still open in them, and their distances.
+
+    Attributes:
+        a: starts.
+        b: ends.
+        cells: (c, 3).
+        distances: (c, 2) at the starts and the ends [m].
+    """
+
+    a: Moment
+    b: Moment
+    cells: np.ndarray
+    distances: np.ndarray
+
+    def part(self, which: slice | np.ndarray) -> _Batch:
+        """Some of the pairs, with their intervals only."""
+        cells = self.cells[which]
+        used, n = np.unique(cells[:, 0], return_inverse=True)
+        cells = np.column_stack([n.ravel(), cells[:, 1:]])
+        return _Batch(self.a.at(used), self.b.at(used), cells, self.distances[which])
+
+
+def travel(kinds: np.ndarray, frames: np.ndarray, a: Moment, b: Moment, shift: np.ndarray) -> np.ndarray:
+    """Bound (c,) [m] on the way that any point of a core goes relative to an obstacle, joints moving linearly.
+
+    The smaller of two bounds. Turns: every joint by its own angle, times the largest distance of the point to its
+    axis; that changes only by the joints beyond it, from either end of the interval. Speeds: the trapezoid of the
+    speeds at the ends, plus a quarter of the largest acceleration, |x''| <= sum_ij |dq_i dq_j| r_max(i, j).
+
+    Args:
+        kinds: (dof,) 0 for a joint that turns, 1 for one that slides.
+        frames: (c,) joint that each core moves with, -1 for the base.
+        a: the start of each core's interval; its `ends` (c, 2, 3) are of that core alone.
+        b: the end.
+        shift: (c, 3) displacement of each obstacle.
+    """
+    dq = b.joints - a.joints
+    active = np.arange(len(kinds)) <= frames[:, None]
+    size = np.where(active, np.abs(dq), 0.0)
+    speeds, far = [], []
+    for moment in (a, b):
+        arms = moment.ends[:, :, None] - moment.origins[:, None]
+        levers = np.cross(moment.axes[:, None], arms)
+        far.append(np.linalg.norm(levers, axis=-1))
+        ways = np.where((kinds == 0)[:, None], levers, moment.axes[:, None])
+        velocity = np.einsum("cejx,cj->cex", ways, np.where(active, dq, 0.0)) - shift[:, None]
+        speeds.append(np.linalg.norm(velocity, axis=-1))
+    reach = np.where(kinds == 0, np.maximum(*far), 1.0)
+    beyond, bend = np.zeros(reach.shape[:2]), np.zeros(reach.shape[:2])
+    for j in range(len(kinds))[::-1]:
+        radius = reach[:, :, j] + (0.5 * beyond if kinds[j] == 0 else 0.0)
+        before = size[:, None, :j].sum(axis=-1)
+        bend += radius * size[:, None, j] * (size[:, None, j] + 2.0 * before)
+        beyond = beyond + radius * size[:, None, j]
+    turns = beyond + np.linalg.norm(shift, axis=-1)[:, None]
+    return np.minimum(turns, 0.5 * (speeds[0] + speeds[1]) + 0.25 * bend).max(axis=1)
+
+
+class Sweeper:
+    """One sweep over a log."""
+
+    def __init__(self, log: MotionLog, required: np.ndarray, aim: float, settings: SweepSettings):
+        """Prepare.
+
+        Args:
+            log: the motion.
+            required: (m, k) distances to keep [m], -inf for pairs that are not checked.
+            aim: claimed smallest distance of all [m], -inf for none.
+            settings: how closely to look.
+        """
+        body = log.body
+        self._required, self._aim, self._settings = required, aim, settings
+        self._kinds, self._frames = log.arm.chain[:-1, 7], body.rows[:, FRAME].astype(int)
+        self._group = np.array([body.names.index(name) for name in body.names], dtype=int)
+        self.kinematics, self._scene = Kinematics(log.arm, body), Scene(body, log.obstacles)
+        self.moment = self.kinematics.moment(log.time, log.joints)
+        shape = required.shape
+        self.found = Sweep(np.full(shape, np.inf), np.full(shape, np.inf), np.full(shape, log.time[0]))
+
+    def run(self) -> Sweep:
+        """Look at the samples, then between them until all is decided."""
+        if not self._required.size:
+            return self.found
+        stack = self._between(*self._samples())
+        while stack:
+            batch = stack.pop()
+            if len(batch.cells) > 2 * BATCH:
+                stack += [batch.part(slice(None, BATCH)), batch.part(slice(BATCH, None))]
+                continue
+            self.found.intervals += len(batch.cells)
+            self.found.complete &= self.found.intervals <= self._settings.max_intervals
+            stack += self._halved(batch)
+        return self.found
+
+    def _record(self, cells: np.ndarray, times: np.ndarray, distances: np.ndarray) -> None:
+        (_, k, o), found = cells.T, self.found
+        np.minimum.at(found.sampled, (k, o), distances)
+        nearest = distances <= found.sampled[k, o]
+        found.when[k[nearest], o[nearest]] = times[nearest]
+
+    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Distances (n, m, k) at the samples, or lower bounds, and which are exact: all that may be the smallest."""
+        out = self._scene.at_least(self.moment)
+        out[:, ~np.isfinite(self._required)] = np.inf
+        exact = np.zeros(out.shape, dtype=bool)
+        for group in np.unique(self._group):
+            mine = self._group == group
+            best, low = np.inf, np.where(mine[:, None], out, np.inf)
+            order = np.argsort(low, axis=None)
+            for part in np.array_split(order, max(1, order.size // 64)):
+                near = low.ravel()[part] < max(best, self._required.max())
+                if not near.any():
+                    break
+                cells = np.column_stack(np.unravel_index(part[near], out.shape))
+                best = min(best, self._measure(out, exact, cells))
+        np.minimum(self.found.sampled, out.min(axis=0), out=self.found.sampled)
+        np.minimum(self.found.certified, out.min(axis=0), out=self.found.certified)
+        return out, exact
+
+    def _measure(self, out: np.ndarray, exact: np.ndarray, cells: np.ndarray) -> float:
+        n, k, o = cells.T
+        out[n, k, o], exact[n, k, o] = self._scene.distances(self.moment, cells), True
+        self._record(cells, self.moment.time[n], out[n, k, o])
+        return out[n, k, o].min()
+
+    def _targets(self, cells: np.ndarray) -> np.ndarray:
+        """Bounds (c,) to reach: what is required and claimed, if it is still true, and close to what was found."""
+        _, k, o = cells.T
+        sampled = self.found.sampled
+        by_group = np.full(len(self._group), np.inf)
+        np.minimum.at(by_group, self._group, sampled.min(axis=1))
+        aim = self._aim if self._aim <= sampled.min() else -np.inf
+        close = by_group[self._group][k] - self._settings.slack
+        wanted = np.maximum(self._required[k, o], aim)
+        return np.where(sampled[k, o] < self._required[k, o], close, np.maximum(wanted, close))
+
+    def _between(self, distances: np.ndarray, exact: np.ndarray) -> list[_Batch]:
+        """The intervals between the samples, with the pairs that a coarse bound leaves open."""
+        a, b = self.moment.at(slice(None, -1)), self.moment.at(slice(1, None))
+        ways, still = np.empty((len(a.time), len(self._frames))), np.zeros((len(a.time), 3))
+        for k, frame in enumerate(self._frames):
+            starts, stops = (m._replace(ends=m.ends[:, k]) for m in (a, b))
+            ways[:, k] = travel(self._kinds, np.full(len(still), frame), starts, stops, still)
+        drift = np.abs(b.time - a.time)[:, None] * np.linalg.norm(self._scene.velocities, axis=1)
+        bound = 0.5 * (distances[:-1] + distances[1:] - ways[:, :, None] - drift[:, None])
+        every = np.column_stack(np.unravel_index(np.arange(bound.size), bound.shape)).reshape(-1, 3)
+        opened = bound.ravel() < self._targets(every)
+        for side in (0, 1):
+            cells = every[opened] + np.array([side, 0, 0])
+            cells = cells[~exact[tuple(cells.T)]]
+            if len(cells):
+                self._measure(distances, exact, cells)
+        self._lower(every[~opened], bound.ravel()[~opened])
+        n, k, o = every[opened].T
+        both = np.column_stack([distances[n, k, o], distances[n + 1, k, o]])
+        return [_Batch(a, b, every[opened], both).part(slice(None))]
+
+    def _lower(self, cells: np.ndarray, bounds: np.ndarray) -> None:
+        np.minimum.at(self.found.certified, tuple(cells[:, 1:].T), bounds)
+
+    def _settle(self, batch: _Batch) -> np.ndarray:
+        """Which pairs of a batch are decided; their bounds go into the result."""
+        n, k, o = batch.cells.T
+        a, b, row = batch.a.at(n), batch.b.at(n), np.arange(len(n))
+        shift = self._scene.velocities[o] * (b.time - a.time)[:, None]
+        starts, stops = (m._replace(ends=m.ends[row, k]) for m in (a, b))
+        way = travel(self._kinds, self._frames[k], starts, stops, shift)
+        bound = 0.5 * (batch.distances.sum(axis=1) - way)
+        done = (bound >= self._targets(batch.cells)) | (way <= self._settings.resolution) | (not self.found.complete)
+        self._lower(batch.cells[done], bound[done])
+        return done
+
+    def _halved(self, batch: _Batch) -> list[_Batch]:
+        """What a batch leaves open, its intervals halved."""
+        left = ~self._settle(batch)
+        if not left.any():
+            return []
+        open_ = batch.part(left)
+        a, b, cells = open_.a, open_.b, open_.cells
+        middle = self.kinematics.moment(0.5 * (a.time + b.time), 0.5 * (a.joints + b.joints))
+        distances = self._scene.distances(middle, cells)
+        self._record(cells, middle.time[cells[:, 0]], distances)
+        first = np.column_stack([open_.distances[:, 0], distances])
+        second = np.column_stack([distances, open_.distances[:, 1]])
+        cells = np.concatenate([cells, cells + np.array([len(a.time), 0, 0])])
+        return [_Batch(a.joined(middle), middle.joined(b), cells, np.concatenate([first, second]))]

@@ -1,0 +1,1 @@
+"""Motion logs and their JSON form."""

@@ -1,0 +1,138 @@
+"""Arms, bodies, obstacles and poses as JSON, both ways.
+
+Poses are unit dual quaternions (8 numbers, see `dualquat`), which go through a file without losing a bit; infinite
+joint limits are null.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..errors import OneDemoError
+from ..geometry.pose import Pose, PosePath
+from ..geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
+from ..robot.arm import Arm
+from ..robot.body import Body
+from ..strict_json import Refused, list_of, number_of, numbers_of, table_of, text_of, texts_of
+
+SHAPES: dict[str, type] = {"sphere": Sphere, "capsule": Capsule, "box": Box, "cylinder": Cylinder, "mesh": Mesh}
+ROUND = ("radius", "length")
+SIZES = {"sphere": ("radius",), "capsule": ROUND, "box": ("size",), "cylinder": ROUND, "mesh": ("vertices",)}
+"""What a shape is made of, by its kind."""
+
+
+def content_of_arm(arm: Arm) -> dict[str, Any]:
+    """An arm as JSON."""
+    return {
+        "name": arm.name,
+        "joint_names": list(arm.joint_names),
+        "chain": arm.chain.tolist(),
+        "lower": [value if math.isfinite(value) else None for value in arm.lower.tolist()],
+        "upper": [value if math.isfinite(value) else None for value in arm.upper.tolist()],
+        "velocity_limits": arm.velocity_limits.tolist(),
+    }
+
+
+def content_of_body(body: Body) -> dict[str, Any]:
+    """A body as JSON."""
+    return {"rows": body.rows.tolist(), "names": list(body.names), "held": list(body.held)}
+
+
+@contextmanager
+def _blaming(key: str) -> Iterator[None]:
+    """Errors of what is built inside name the key that it was built from."""
+    try:
+        yield
+    except Refused:
+        raise
+    except OneDemoError as error:
+        raise Refused(key, str(error)) from None
+
+
+def pose_of(key: str, value: Any) -> Pose:
+    """A pose from its 8 numbers."""
+    with _blaming(key):
+        return Pose(numbers_of(key, value, (8,)))
+
+
+def path_of(key: str, value: Any) -> PosePath:
+    """A path from lists of 8 numbers."""
+    with _blaming(key):
+        return PosePath(numbers_of(key, value, (None, 8)))
+
+
+def arm_of(value: Any) -> Arm:
+    """An arm from its table."""
+    table = table_of("arm", value, ("name", "joint_names", "chain", "lower", "upper", "velocity_limits"))
+    names = texts_of("arm.joint_names", table["joint_names"])
+    with _blaming("arm"):
+        return Arm(
+            text_of("arm.name", table["name"]),
+            names,
+            numbers_of("arm.chain", table["chain"], (len(names) + 1, 8)),
+            _limits("arm.lower", table["lower"], -math.inf),
+            _limits("arm.upper", table["upper"], math.inf),
+            numbers_of("arm.velocity_limits", table["velocity_limits"], (len(names),)),
+        )
+
+
+def _limits(key: str, value: Any, absent: float) -> np.ndarray:
+    limits = list_of(key, value)
+    return np.array([absent if v is None else number_of(f"{key}[{k}]", v) for k, v in enumerate(limits)])
+
+
+def body_of(value: Any) -> Body:
+    """A body from its table."""
+    table = table_of("body", value, ("rows", "names", "held"))
+    with _blaming("body"):
+        return Body(
+            numbers_of("body.rows", table["rows"], (None, 8)),
+            texts_of("body.names", table["names"]),
+            texts_of("body.held", table["held"]),
+        )
+
+
+def content_of_obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    """An obstacle as JSON."""
+    kind = next(kind for kind, shape in SHAPES.items() if isinstance(obstacle.shape, shape))
+    sizes = {key: np.asarray(getattr(obstacle.shape, key)).tolist() for key in SIZES[kind]}
+    return {
+        "shape": {"kind": kind, **sizes},
+        "pose": obstacle.pose.dq.tolist(),
+        "velocity": obstacle.velocity.tolist(),
+        "name": obstacle.name,
+        "margin": None if obstacle.margin is None else float(obstacle.margin),
+    }
+
+
+def obstacle_of(key: str, value: Any) -> Obstacle:
+    """An obstacle from its table."""
+    table = table_of(key, value, ("shape", "pose", "velocity", "name", "margin"))
+    margin = table["margin"]
+    with _blaming(key):
+        return Obstacle(
+            _shape(f"{key}.shape", table["shape"]),
+            pose_of(f"{key}.pose", table["pose"]),
+            numbers_of(f"{key}.velocity", table["velocity"], (3,)),
+            text_of(f"{key}.name", table["name"]),
+            None if margin is None else number_of(f"{key}.margin", margin),
+        )
+
+
+def _shape(key: str, value: Any) -> Shape:
+    kind = value.get("kind") if isinstance(value, dict) else None
+    if not isinstance(kind, str) or kind not in SHAPES:
+        raise Refused(f"{key}.kind", f"is {kind!r}; allowed: {', '.join(SHAPES)}")
+    table = table_of(key, value, ("kind", *SIZES[kind]))
+    with _blaming(key):
+        if kind == "box":
+            x, y, z = numbers_of(f"{key}.size", table["size"], (3,)).tolist()
+            return Box((x, y, z))
+        if kind == "mesh":
+            return Mesh(numbers_of(f"{key}.vertices", table["vertices"], (None, 3)))
+        return SHAPES[kind](*(number_of(f"{key}.{name}", table[name]) for name in SIZES[kind]))

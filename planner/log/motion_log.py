@@ -1,0 +1,215 @@
+"""Logs of planned or executed motions: all that a judge needs who trusts nobody.
+
+A log is one JSON file, its parts as in `log_parts`; `sha256` is taken over the content, canonically written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import OneDemoError
+from ..geometry.pose import Pose, PosePath
+from ..geometry.shapes import Obstacle
+from ..robot.arm import Arm
+from ..robot.body import FRAME, Body
+from ..strict_json import Refused, list_of, number_of, numbers_of, parsed, table_of, texts_of
+from .log_json import (
+    arm_of,
+    body_of,
+    content_of_arm,
+    content_of_body,
+    content_of_obstacle,
+    obstacle_of,
+    path_of,
+    pose_of,
+)
+
+FORMAT_VERSION = 1
+MAX_BYTES = 64 * 2**20
+FARTHEST = 1e6
+"""Joints [rad or m], times [s], places [m] and speeds [m/s] above this are mistakes, and would overflow."""
+CLAIMS = ("clearance", "position_error", "angle_error", "joint_margin", "deviation")
+PROBLEM = ("arm", "body", "obstacles", "allowed", "goal", "safety", "demonstrated")
+"""What was asked; the rest of a log is the answer."""
+KEYS = ("format_version", *PROBLEM, "time", "joints", "claims")
+
+
+class BadLog(OneDemoError, ValueError):
+    """A motion log, or the file it comes from, cannot be used."""
+
+    def __init__(self, path: str | Path | None, key: str, reason: str):
+        self.path, self.key, self.reason = path, key, reason
+        super().__init__(f"{path or 'motion log'}: {key}: {reason}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionLog:
+    """A motion of an arm, the world it went through, and what is claimed of it.
+
+    Attributes:
+        arm: whose joints these are.
+        body: capsules on its joints' frames, those of held objects included.
+        obstacles: where they are at time 0; they keep their velocities.
+        time: (n,) [s].
+        joints: (n, dof) [rad or m]; between samples the motion is linear.
+        safety: distance [m] claimed to be kept from every obstacle that has no margin of its own.
+        goal: pose of the tcp at the end; None: none was asked for.
+        demonstrated: path that the end of the motion should have kept; None: there is none.
+        allowed: (body name, obstacle name) of contacts that are wanted, and so not checked.
+        claims: numbers that the producer claims: clearance, position_error, joint_margin, deviation [m],
+            angle_error [rad]; any of them may be absent.
+        format_version: of the file.
+
+    Raises:
+        BadLog: an entry has the wrong shape, is not finite or names what is not there.
+    """
+
+    arm: Arm
+    body: Body
+    obstacles: tuple[Obstacle, ...]
+    time: np.ndarray
+    joints: np.ndarray
+    safety: float
+    goal: Pose | None = None
+    demonstrated: PosePath | None = None
+    allowed: tuple[tuple[str, str], ...] = ()
+    claims: Mapping[str, float] = field(default_factory=dict)
+    format_version: int = FORMAT_VERSION
+
+    def __post_init__(self):
+        if self.format_version != FORMAT_VERSION:
+            raise BadLog(None, "format_version", f"is {self.format_version!r}; this program knows {FORMAT_VERSION}")
+        time = _checked("time", self.time, (None,))
+        joints = _checked("joints", self.joints, (len(time), self.arm.dof))
+        if not len(time):
+            raise BadLog(None, "time", "has no samples")
+        places = [[*o.pose.position, *o.velocity] for o in self.obstacles]
+        _checked("obstacles", np.array(places).reshape(-1, 6), (None, 6))
+        if np.abs(np.linalg.norm(self.arm.chain[:, :4], axis=1) - 1.0).max() > 1e-6:
+            raise BadLog(None, "arm.chain", "holds a quaternion that is not of unit norm")
+        if len(self.body) and self.body.rows[:, FRAME].max() >= self.arm.dof:
+            raise BadLog(None, "body.rows", f"a capsule moves with a joint beyond the {self.arm.dof} of the arm")
+        if not 0.0 <= _number("safety", self.safety) <= FARTHEST:
+            raise BadLog(None, "safety", f"{self.safety!r} is not a length from 0 on")
+        claims = {key: _number(f"claims.{key}", value) for key, value in self.claims.items()}
+        unknown = sorted(set(claims) - set(CLAIMS))
+        if unknown:
+            raise BadLog(None, f"claims.{unknown[0]}", f"is unknown; allowed: {', '.join(CLAIMS)}")
+        allowed = tuple(sorted({(str(mine), str(other)) for mine, other in self.allowed}))
+        for mine, other in allowed:
+            if mine not in self.body.names or not other or other not in [o.name for o in self.obstacles]:
+                raise BadLog(None, "allowed", f"{mine!r} with {other!r} is no part of the body with a named obstacle")
+        for name, value in {"time": time, "joints": joints, "safety": float(self.safety)}.items():
+            object.__setattr__(self, name, value)
+        for name, value in {"claims": claims, "allowed": allowed, "obstacles": tuple(self.obstacles)}.items():
+            object.__setattr__(self, name, value)
+
+
+def content_of(log: MotionLog) -> dict[str, Any]:
+    """The log as JSON knows it, without its digest."""
+    return {
+        "format_version": log.format_version,
+        "arm": content_of_arm(log.arm),
+        "body": content_of_body(log.body),
+        "obstacles": [content_of_obstacle(obstacle) for obstacle in log.obstacles],
+        "allowed": [list(pair) for pair in log.allowed],
+        "goal": None if log.goal is None else log.goal.dq.tolist(),
+        "safety": log.safety,
+        "demonstrated": None if log.demonstrated is None else log.demonstrated.dqs.tolist(),
+        "time": log.time.tolist(),
+        "joints": log.joints.tolist(),
+        "claims": dict(log.claims),
+    }
+
+
+def digest_of(log: MotionLog) -> str:
+    """Sha256 of the content, canonically written."""
+    text = json.dumps(content_of(log), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_log(log: MotionLog, path: str | Path) -> None:
+    """Write a log to a JSON file.
+
+    Raises:
+        BadLog: it is larger than what `read_log` reads.
+    """
+    text = json.dumps({**content_of(log), "sha256": digest_of(log)}, allow_nan=False)
+    if len(text) > MAX_BYTES:
+        raise BadLog(path, "file", f"would hold {len(text)} bytes; at most {MAX_BYTES} are read")
+    Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def read_log(path: str | Path) -> MotionLog:
+    """Read a log; every entry is checked, then the digest.
+
+    Raises:
+        BadLog: the file or one of its entries cannot be used; the message names both.
+    """
+    try:
+        data = parsed(Path(path), MAX_BYTES)
+        version = data.get("format_version") if isinstance(data, dict) else None
+        if type(version) is not int or version != FORMAT_VERSION:
+            raise Refused("format_version", f"is {version!r}; this program reads {FORMAT_VERSION}")
+        table_of("", data, (*KEYS, "sha256"))
+        log = _log_from(data)
+    except (Refused, BadLog) as error:
+        raise BadLog(path, error.key, error.reason) from None
+    if digest_of(log) != data["sha256"]:
+        raise BadLog(path, "sha256", "does not belong to the content: the file was changed after it was written")
+    return log
+
+
+def _log_from(data: dict[str, Any]) -> MotionLog:
+    goal, demonstrated, claims = data["goal"], data["demonstrated"], data["claims"]
+    if not isinstance(claims, dict):
+        raise Refused("claims", "is not a table")
+    pairs = [texts_of(f"allowed[{k}]", pair) for k, pair in enumerate(list_of("allowed", data["allowed"]))]
+    for k, pair in enumerate(pairs):
+        if len(pair) != 2:
+            raise Refused(f"allowed[{k}]", "is not a pair of names")
+    arm = arm_of(data["arm"])
+    return MotionLog(
+        arm=arm,
+        body=body_of(data["body"]),
+        obstacles=tuple(
+            obstacle_of(f"obstacles[{k}]", t) for k, t in enumerate(list_of("obstacles", data["obstacles"]))
+        ),
+        time=numbers_of("time", data["time"], (None,)),
+        joints=numbers_of("joints", data["joints"], (None, arm.dof)),
+        safety=number_of("safety", data["safety"]),
+        goal=None if goal is None else pose_of("goal", goal),
+        demonstrated=None if demonstrated is None else path_of("demonstrated", demonstrated),
+        allowed=tuple((mine, other) for mine, other in pairs),
+        claims={key: number_of(f"claims.{key}", value) for key, value in claims.items()},
+    )
+
+
+def _number(key: str, value: Any) -> float:
+    try:
+        return number_of(key, value)
+    except Refused as error:
+        raise BadLog(None, error.key, error.reason) from None
+
+
+def _checked(key: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """A read-only copy, of this shape, finite and of sensible size."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (ValueError, TypeError):
+        raise BadLog(None, key, "is not an array of numbers") from None
+    if array.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, array.shape, strict=True)):
+        wanted = " x ".join("any" if size is None else str(size) for size in shape)
+        raise BadLog(None, key, f"has shape {array.shape}; expected {wanted}")
+    bad = np.argwhere(~(np.abs(array) <= FARTHEST))
+    if len(bad):
+        raise BadLog(None, f"{key}[{bad[0][0]}]", f"is not finite, or above {FARTHEST:g}")
+    array.flags.writeable = False
+    return array

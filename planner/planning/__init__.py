@@ -1,0 +1,1 @@
+"""Plans: a demonstration, a start, a goal and obstacles in, joints for every tick out."""

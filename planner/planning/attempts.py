@@ -1,0 +1,49 @@
+"""The closed loops that a plan may try, the likeliest first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from ..escape.detour import ESCAPED, FREE
+from ..escape.repet import Corner
+from .settings import PlanSettings
+
+
+class Attempt(NamedTuple):
+    """A closed loop that may be tried.
+
+    Attributes:
+        guide: fraction of the imitated path where the guiding pose is.
+        bias: of the detours, see `RepetSettings.bias`.
+        factor: of the planning margin.
+        early: detours come back to the path at the first pose that they can.
+    """
+
+    guide: float
+    bias: Corner
+    factor: float = 1.0
+    early: bool = False
+
+
+def attempts(settings: PlanSettings, escapes: list[int]) -> Iterator[Attempt]:
+    """The closed loops that may be tried, the likeliest first.
+
+    Args:
+        settings: of the planner.
+        escapes: statuses of the tries so far, which grows: biases help where the arm could not follow a detour, not
+            where there is none.
+    """
+    guide, later = settings.motion.guide, settings.motion.max_guide
+    first = settings.biases[0]
+    yield Attempt(guide, first)
+    if escapes[-1] == ESCAPED:
+        yield Attempt(guide, first, early=True)
+    if escapes[-1] in (FREE, ESCAPED):
+        yield Attempt(later, first)
+    if not settings.avoid:
+        return
+    yield Attempt(guide, first, settings.tight)
+    if escapes[-1] == ESCAPED:
+        for bias in settings.biases[1:]:
+            yield Attempt(guide, bias, settings.tight)

@@ -1,0 +1,222 @@
+"""A leg by a search in joint space: to a posture on the demonstrated path from which the rest can be followed."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..control.inverse_kinematics import inverse_kinematics
+from ..control.pursuit import ARRIVED, fresh_memory
+from ..geometry.pose import Pose, PosePath
+from ..imitation.tsia import guide_index, imitated_path
+from ..robot.arm import Arm
+from ..safety.guarded_pursuit import guarded_roll_out
+from .joint_space_rrt import connect, shortcut
+from .planning_scene import SceneWork
+
+if TYPE_CHECKING:
+    from .settings import PlanSettings
+
+
+FEWER, FEWEST = 4, 100
+"""Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
+MUST = 100.0
+"""Cost [rad] of a posture from which what must come next cannot be done."""
+AROUND = 0.5
+"""Spread [rad] of the starts of the inverse kinematics around the nearest posture."""
+STRAY, LOOK = 0.004, 3
+"""Distance [m] from its path up to which a strict leg counts as straight; and ticks between looks at it."""
+RAMP = 0.3
+"""Seconds from rest to full speed."""
+
+
+class JointLeg(NamedTuple):
+    """What a search found.
+
+    Attributes:
+        joints: (t, dof) joints at every tick.
+        path: the part of the demonstrated path that is followed at the end.
+        guide: index in the imitated path at which that part begins.
+        margin: smallest joint margin [rad].
+        goes_on: what comes next can be done from its end.
+    """
+
+    joints: np.ndarray
+    path: PosePath
+    guide: int
+    margin: float
+    goes_on: bool
+
+
+class After(NamedTuple):
+    """What comes after a leg.
+
+    Attributes:
+        scene: the arm among the obstacles, with the contacts that are wanted then.
+        path: of the tcp.
+        must: it must be possible from the end of the leg.
+    """
+
+    scene: SceneWork
+    path: PosePath
+    must: bool
+
+    def can_be_done(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
+        """True if it can be followed from joints q (dof,); strictly if it must."""
+        joints, _ = _followed(self.scene, work, self.path, q, settings)
+        return joints is not None and (not self.must or strayed(arm, joints, self.path.dqs) <= STRAY)
+
+
+def strayed(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
+    """The farthest [m] that the tool is from a path.
+
+    Args:
+        arm: the arm.
+        joints: (t, dof) on the way.
+        path: (n, 8) poses of the tool.
+    """
+    edges = PosePath(path).positions
+    starts, ways = edges[:-1], np.diff(edges, axis=0)
+    if len(ways) == 0:
+        starts, ways = edges, np.zeros((1, 3))
+    lengths = np.maximum((ways * ways).sum(axis=1), 1e-12)
+    farthest = 0.0
+    for q in joints[::LOOK]:
+        from_start = arm.fk(q).position - starts
+        part = np.clip((from_start * ways).sum(axis=1) / lengths, 0.0, 1.0)
+        farthest = max(farthest, float(np.linalg.norm(from_start - part[:, None] * ways, axis=1).min()))
+    return farthest
+
+
+class _Posture(NamedTuple):
+    cost: float
+    order: int
+    q: np.ndarray
+    tail: np.ndarray
+    path: PosePath
+    guide: int
+    goes_on: bool
+
+
+def joint_leg(
+    arm: Arm,
+    scene: SceneWork,
+    work: np.ndarray,
+    demonstrated: PosePath,
+    goal: Pose,
+    q: np.ndarray,
+    settings: PlanSettings,
+    after: After | None,
+    seed: int,
+) -> JointLeg | None:
+    """Search a way from joints q (dof,) to the goal; None if none was found.
+
+    Args:
+        arm: the arm.
+        scene: it among obstacles.
+        work: its controller and pursuit, see `workspace`.
+        demonstrated: the segment to imitate.
+        goal: where the tcp must end.
+        q: (dof,) joints at the start.
+        settings: see `PlanSettings`.
+        after: what comes next, or None.
+        seed: of all random choices.
+    """
+    search = settings.search
+    assert search is not None
+    rng = np.random.default_rng(seed)
+    state = np.array([float(seed % 2147483646) + 1.0])
+    trees, parents = np.empty((2, search.nodes, arm.dof)), np.empty((2, search.nodes))
+    out = np.empty((2 * search.nodes, arm.dof))
+    ends = np.empty((2, arm.dof))
+    for turn in range(search.rounds):
+        later = search.rounds - 1 - turn
+        iterations = max(search.iterations // FEWER**later, min(FEWEST, search.iterations))
+        found = _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, search.seeds * 2**turn)
+        best, least = None, math.inf
+        for posture in sorted(found)[: search.postures]:
+            if posture.cost >= least:
+                break  # no way is shorter than the straight line
+            count = connect(scene.seen, q, posture.q, trees, parents, search.step, iterations, state, out)
+            if count:
+                count = shortcut(scene.seen, out, count, search.shortcuts, state, ends)
+                cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
+                if cost < least:
+                    best, least = (out[:count].copy(), posture), cost
+        if best is not None and (least < MUST or later == 0):
+            points, posture = best
+            way = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
+            joints = np.vstack([way[:-1], posture.tail])
+            margin = min(arm.margin(row) for row in joints)
+            return JointLeg(joints, posture.path, posture.guide, margin, posture.goes_on)
+    return None
+
+
+def _length(points: np.ndarray) -> float:
+    """Of a joint path (n, dof), by the joint that moves most on each line [rad]."""
+    return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
+
+
+def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, seeds) -> list[_Posture]:
+    """Clear postures on the demonstrated path from which the rest of it can be followed, with what they cost."""
+    search, found = settings.search, []
+    imitated = imitated_path(demonstrated, goal)
+    first, last = guide_index(imitated, settings.motion.guide), len(imitated) - 1
+    home = np.clip(q, np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi))
+    for index in sorted({round(i) for i in np.linspace(first, last, search.targets)}):
+        path = imitated[index:]
+        near = inverse_kinematics(arm, path[0], home, iterations=150)
+        for k in range(seeds):
+            low, high = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
+            guess = home if k == 0 and seeds == search.seeds else rng.uniform(low, high)
+            if k % 2 and near is not None:  # around the nearest posture the same elbow is found turned
+                guess = np.clip(near + rng.normal(0.0, AROUND, arm.dof), low, high)
+            solution = inverse_kinematics(arm, path[0], guess, iterations=150)
+            if solution is None or scene.room(solution) < 0.0:
+                continue
+            tail, margin = _followed(scene, work, path, solution, settings)
+            if tail is None:
+                continue
+            cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
+            cost += search.late * (index - first) / max(last - first, 1)
+            goes_on = after is None or after.can_be_done(arm, work, tail[-1], settings)
+            if not goes_on:
+                assert after is not None
+                cost += MUST if after.must else 5.0
+            found.append(_Posture(cost, len(found), solution, tail, path, index, goes_on))
+    return found
+
+
+def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]:
+    """Joints of following a path from q among the obstacles, or None; and the smallest joint margin."""
+    dof, dt = len(q), settings.motion.dt
+    trace, memory = np.empty((round(settings.max_seconds / dt) + 1, dof)), fresh_memory()
+    status, last, margin, _ = guarded_roll_out(
+        work, scene.robot, path.dqs, q.copy(), dt, memory, np.empty(dof), np.empty(dof), trace, 0
+    )
+    return (trace[: last + 1].copy() if status == ARRIVED else None), margin
+
+
+def timed_on_lines(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:
+    """Points at every tick of `dt` [s] on the straight lines between joint points (n, dof), each from rest to rest.
+
+    A corner that is taken at speed throws what is in the hand about.
+
+    Args:
+        points: (n, dof) joints.
+        speeds: (dof,) largest speeds of the joints.
+        dt: seconds per tick.
+    """
+    rows = [points[:1]]
+    for start, end in pairwise(points):
+        least = max(float((np.abs(end - start) / speeds).max()), dt)  # seconds at full speed
+        ramp = min(RAMP, math.sqrt(least * RAMP))
+        total = max(least, ramp) + ramp
+        t = np.linspace(0.0, total, math.ceil(total / dt) + 1)[1:]
+        begun, left = t * t / (2.0 * least * RAMP), (total - t) ** 2 / (2.0 * least * RAMP)
+        part = np.where(t <= ramp, begun, np.where(total - t <= ramp, 1.0 - left, (t - 0.5 * ramp) / least))
+        rows.append(start + part[:, None] * (end - start))
+    return np.vstack(rows)

@@ -1,0 +1,249 @@
+"""Compiled search in joint space (RRT-Connect, Kuffner and LaValle 2000) with edges that are proven clear.
+
+For what a tool's detour cannot solve: the hand's way is free, but the arm's is not. Not in the paper.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..collision.clearance import SELF_MARGIN, all_beyond, bound_motion, capsule_distance, obstacle_distance, room_at
+from ..collision.robot_arrays import (
+    AFTER,
+    B_FRAME,
+    BODY,
+    HEADER,
+    HIGH,
+    LOW,
+    MARGIN,
+    N_CAPSULES,
+    N_OBSTACLES,
+    N_PAIRS,
+    OBSTACLES,
+    PAIRS,
+    PART,
+    SETTINGS,
+    W_REACH,
+    WORLD,
+    may_touch,
+    place_capsules,
+)
+from ..escape.tangent_plane import random_number
+from ..jit import inlined, inner, kernel
+
+SMALLEST = 1e-4
+"""Way [m] below which a stretch that cannot be proven is held to be blocked."""
+
+
+@inner
+def _clear_stretch(g):
+    """Fraction of a step, up to 1, that is proven clear from WORLD on, given the ways in W_REACH; -1 if too close."""
+    stretch, longest = 1.0, 0.0
+    for c in range(int(g[HEADER, N_CAPSULES])):
+        longest = max(longest, g[WORLD + c, W_REACH])
+    for k in range(int(g[HEADER, N_OBSTACLES])):
+        keep = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, WORLD, k, 0.0, keep + stretch * longest):
+            continue
+        for c in range(int(g[HEADER, N_CAPSULES])):
+            if g[BODY + c, B_FRAME] >= 0.0 and not may_touch(g, k, c):
+                way = g[WORLD + c, W_REACH]
+                room = obstacle_distance(g, WORLD, c, k, 0.0, keep + stretch * way) - keep
+                if room < 0.0:
+                    return -1.0
+                if room < stretch * way:
+                    stretch = room / way
+    first = int(g[HEADER, PAIRS])
+    for p in range(first, first + int(g[HEADER, N_PAIRS])):
+        i, j = int(g[p, 0]), int(g[p, 1])
+        way = g[WORLD + i, W_REACH] + g[WORLD + j, W_REACH]
+        room = capsule_distance(g, WORLD, i, j) - g[SETTINGS, SELF_MARGIN]
+        if room < 0.0:
+            return -1.0
+        if room < stretch * way:
+            stretch = room / way
+    return stretch
+
+
+@kernel
+def joint_edge_is_clear(g, start, end):
+    """True if the robot keeps clear on the straight line in joint space from start to end, both included."""
+    n, part, at = len(start), g[PART], g[AFTER]
+    for s in (1.0, 0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
+        for i in range(n):
+            at[i] = start[i] + s * (end[i] - start[i])
+        if room_at(g, at[:n], 0.0, 0.1) < 0.0:
+            return False
+    s = 0.0
+    for _ in range(1000):
+        for i in range(n):
+            at[i] = start[i] + s * (end[i] - start[i])
+            part[i] = (1.0 - s) * (end[i] - start[i])
+        place_capsules(g, at[:n], WORLD)
+        bound_motion(g, WORLD, part)
+        stretch = _clear_stretch(g)
+        if stretch < 0.0:
+            return False
+        if stretch >= 1.0:
+            return True
+        way = 0.0
+        for c in range(int(g[HEADER, N_CAPSULES])):
+            way = max(way, g[WORLD + c, W_REACH])
+        if stretch * way < SMALLEST:
+            return False
+        s += stretch * (1.0 - s)
+    return False
+
+
+@inner
+def _distance(a, b):
+    s = 0.0
+    for i in range(len(a)):
+        s += (a[i] - b[i]) ** 2
+    return math.sqrt(s)
+
+
+@inner
+def _nearest(tree, count, q):
+    best, least = 0, math.inf
+    for k in range(count):
+        d = _distance(tree[k, : len(q)], q)
+        if d < least:
+            best, least = k, d
+    return best
+
+
+@inner
+def _extend(g, tree, parents, count, q, step, greedy):
+    """Grow a tree towards q by one step, or by as many as are clear: (new count, True if q was reached)."""
+    n, near = len(q), _nearest(tree, count, q)
+    while count < len(tree):
+        d = _distance(tree[near, :n], q)
+        part = min(1.0, step / max(d, 1e-12))
+        for i in range(n):
+            tree[count, i] = tree[near, i] + part * (q[i] - tree[near, i]) if part < 1.0 else q[i]
+        if not joint_edge_is_clear(g, tree[near, :n], tree[count, :n]):
+            return count, False
+        parents[count] = near
+        near, count = count, count + 1
+        if part == 1.0:
+            return count, True
+        if not greedy:
+            return count, False
+    return count, False
+
+
+@inner
+def _read_branch(tree, parents, row, out, at, back, n):
+    """Write the branch of a node into `out` from row `at` on, from the root or back to it; the next free row."""
+    count, k = 0, row
+    while k >= 0:
+        count, k = count + 1, int(parents[k])
+    k = row
+    for i in range(count):
+        place = at + i if back else at + count - 1 - i
+        for j in range(n):
+            out[place, j] = tree[k, j]
+        k = int(parents[k])
+    return at + count
+
+
+@inlined
+def _changed(counts, k, value):
+    """The pair with another number in place k."""
+    return (value, counts[1]) if k == 0 else (counts[0], value)
+
+
+@kernel
+def connect(g, start, goal, trees, parents, step, iterations, state, out):
+    """A clear path in joint space from start to goal, the number of its points; 0 if none was found.
+
+    Args:
+        g: the robot among obstacles, see `robot_work`.
+        start: (n,) joints.
+        goal: (n,) joints.
+        trees: (2, m, n) scratch.
+        parents: (2, m) scratch.
+        step: longest edge [rad].
+        iterations: most samples.
+        state: (1,) of the random numbers.
+        out: (>= 2 m, n) result.
+    """
+    n = len(start)
+    for i in range(n):
+        trees[0, 0, i], trees[1, 0, i] = start[i], goal[i]
+    parents[0, 0] = parents[1, 0] = -1
+    counts = (1, 1)
+    sample = g[8, 16 : 16 + n]
+    for k in range(iterations):
+        a, b = (0, 1) if k % 2 == 0 else (1, 0)
+        for i in range(n):
+            low, high = max(g[LOW, i], -math.pi), min(g[HIGH, i], math.pi)
+            sample[i] = low + random_number(state) * (high - low)
+        if k < 2:
+            for i in range(n):
+                sample[i] = trees[b, 0, i]
+        before = counts[a]
+        counts = _changed(counts, a, _extend(g, trees[a], parents[a], before, sample, step, k < 2)[0])
+        if counts[a] == before:
+            continue
+        if counts[a] == len(trees[a]) or counts[b] == len(trees[b]):
+            return 0
+        target = trees[a, counts[a] - 1]
+        count, met = _extend(g, trees[b], parents[b], counts[b], target, step, True)
+        counts = _changed(counts, b, count)
+        if met:
+            at = _read_branch(trees[0], parents[0], counts[0] - 1, out, 0, False, n)
+            # the two trees share the point at which they have met
+            return _read_branch(trees[1], parents[1], counts[1] - 1, out, at - 1, True, n)
+    return 0
+
+
+@inner
+def _on_edge(path, k, s, out):
+    """The point at fraction s between points k and k + 1 of a path."""
+    for d in range(path.shape[1]):
+        out[d] = path[k, d] + s * (path[k + 1, d] - path[k, d])
+
+
+@inner
+def _moved(path, first, count, to):
+    """Move the points from `first` to the end so that they begin at row `to`; the new number of points."""
+    n = count - first
+    for m in range(n):
+        k = m if to < first else n - 1 - m
+        for d in range(path.shape[1]):
+            path[to + k, d] = path[first + k, d]
+    return to + n
+
+
+@kernel
+def shortcut(g, path, count, tries, state, ends):
+    """Put clear straight lines in place of stretches of a joint path (count, n), from anywhere to anywhere on it.
+
+    Args:
+        g: the robot among obstacles, see `robot_work`.
+        path: (m, n), the first `count` rows are the path; changed.
+        count: number of its points.
+        tries: lines to try.
+        state: (1,) of the random numbers.
+        ends: (2, n) scratch.
+
+    Returns:
+        The new number of points.
+    """
+    for _ in range(tries):
+        if count < 3 or count + 1 >= len(path):
+            break
+        s, t = random_number(state) * (count - 1), random_number(state) * (count - 1)
+        s, t = min(s, t), max(s, t)
+        i, j = int(s), int(t)
+        if i == j:
+            continue
+        _on_edge(path, i, s - i, ends[0])
+        _on_edge(path, j, t - j, ends[1])
+        if joint_edge_is_clear(g, ends[0], ends[1]):
+            count = _moved(path, j + 1, count, i + 3)
+            for d in range(path.shape[1]):
+                path[i + 1, d], path[i + 2, d] = ends[0, d], ends[1, d]
+    return count

@@ -1,0 +1,104 @@
+"""What plans and follows legs among obstacles, run once before anybody waits for it.
+
+Kernels are compiled when they are first called, or loaded from the disk: half a minute, or half a second, that must
+not be a tick's. None of it may depend on whether a posture of the arm happens to be clear: what touches itself in the
+middle of its joints' ranges would plan nothing. So all but the messages is of a body that is a point at the tool.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from ..control.arm_arrays import bound
+from ..control.controller import Controller
+from ..geometry import dualquat as dq
+from ..geometry.pose import Pose, PosePath
+from ..geometry.shapes import Obstacle, Sphere
+from ..imitation.segmentation import resampled
+from ..imitation.tsia import final_path, imitated_path, screw_path
+from ..planning.joint_space_motion import joint_leg
+from ..planning.planning_scene import SceneWork
+from ..planning.settings import JointSearchSettings, PlanSettings
+from ..robot.arm import Arm
+from ..robot.body import FRAME, RADIUS, WIDTH, Body
+from ..safety.safety_layer import SafetyLayer
+from .command import ReactiveSettings
+from .reactive_planner import ReactivePlanner
+
+STEP, STEPS = 0.005, 4
+"""Steps of the leg [m], and how many."""
+FAR = Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.0, 0.0, 50.0]), name="far")
+SLOW = np.array([0.0, 0.0, 1e-3])
+"""Velocity [m/s] of an obstacle that moves, but not far."""
+SHORT = PlanSettings(search=JointSearchSettings(seeds=1, targets=1, postures=1, rounds=1, shortcuts=1))
+
+
+def warm_up(arm: Arm, body: Body) -> None:
+    """Compile, or load from the cache, what planning and following may need; what is compiled is for any arm.
+
+    Args:
+        arm: the arm.
+        body: its capsules.
+    """
+    q = 0.5 * (np.maximum(arm.lower, -1.0) + np.minimum(arm.upper, 1.0))
+    row = np.zeros(WIDTH)
+    row[FRAME], row[RADIUS] = arm.dof - 1.0, 0.001
+    point, path = Body(row[None], ("point",)), _leg(arm.fk(q))
+    _algebra(path.dqs)
+    for seen in ((FAR,), (replace(FAR, velocity=SLOW),)):
+        _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT)), q, path, seen)
+    _search(arm, point, q)
+    SafetyLayer((arm,), (point,), (FAR,), SHORT.motion.dt)(q, np.zeros(arm.dof))
+    Controller(arm)(q, path[-1])
+    # what names what is in the way
+    scene = SceneWork.of(arm, body, (FAR,), SHORT)
+    scene.tightest(q)
+    scene.tightest_of_tool(path[0])
+
+
+def _leg(start: Pose) -> PosePath:
+    """A short way up."""
+    up = Pose.from_position_quaternion([0.0, 0.0, STEPS * STEP]) @ start
+    return final_path(start, imitated_path(resampled(screw_path(start, up, STEP), STEP), up), 1)
+
+
+def _algebra(x: np.ndarray) -> None:
+    """What is called from anywhere with arrays that may be written to or not, which is another type each.
+
+    Args:
+        x: (n, 8) poses, read-only.
+    """
+    for one, other in product((x, x.copy()), repeat=2):
+        dq.mul(one, other)
+        dq.sclerp(one, other, np.zeros(len(x)))
+    turn = dq.identity()[:4]
+    turn.flags.writeable = False
+    for place, other in product((np.zeros(3), turn[1:]), (turn, turn.copy())):
+        dq.from_position_quaternion(place, other)
+    for one in (x, x.copy()):
+        dq.translation(one)
+        dq.normalized(one)
+        dq.dq_from_twist(dq.twist_from_dq(one))
+
+
+def _follow(planner: ReactivePlanner, q: np.ndarray, path: PosePath, seen: tuple[Obstacle, ...]) -> None:
+    """A leg planned, followed, and foreseen where something moves; then strictly along it."""
+    for strictly in (False, True):
+        planner.see(seen)
+        planner.go(path, strictly=strictly)
+        planner.step(q)
+        planner.see(tuple(obstacle.at(STEP) for obstacle in seen))
+        planner.step(q)
+
+
+def _search(arm: Arm, point: Body, q: np.ndarray) -> None:
+    """A search in joint space, to where the arm is: whatever it can reach, it can reach that."""
+    here, motion = arm.fk(q), SHORT.motion
+    scene, work = (
+        SceneWork.of(arm, point, (FAR,), SHORT),
+        bound(arm, motion.controller.packed(), motion.pursuit.packed()),
+    )
+    joint_leg(arm, scene, work, PosePath(here.dq[None]), here, q, SHORT, None, 0)

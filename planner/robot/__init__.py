@@ -1,0 +1,1 @@
+"""One arm: its chain, its capsules, read from URDF and MJCF."""

@@ -1,0 +1,160 @@
+"""Serial arms: forward kinematics, body Jacobian and limits, compiled; read from MuJoCo models or URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import BadModel, BadShape, NotFinite
+from ..geometry.pose import Pose
+from .chain_readers import ChainData, chain_from_mujoco, chain_from_urdf
+from .kinematics import FRAME, forward_into, forward_jacobian_into
+
+MAX_DOF = 16
+
+
+def _readonly(array: ArrayLike) -> np.ndarray:
+    out = np.array(array, dtype=np.float64)
+    out.flags.writeable = False
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """A serial chain from the world to a tool frame.
+
+    Attributes:
+        name: for messages.
+        joint_names: (dof,) in order from the base.
+        chain: (dof + 1, 8), see the module `chain`.
+        lower: (dof,) lower joint limits [rad or m]; -inf for a continuous joint.
+        upper: (dof,) upper joint limits [rad or m].
+        velocity_limits: (dof,) largest joint speeds [rad/s or m/s].
+
+    Raises:
+        BadModel: no joints, too many, limits out of order, or numbers that are not finite.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    chain: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity_limits: np.ndarray
+
+    def __post_init__(self):
+        dof = len(self.joint_names)
+        if not 1 <= dof <= MAX_DOF:
+            raise BadModel(self.name, "joints", f"has {dof}; allowed are 1 to {MAX_DOF}")
+        shapes = {"chain": (dof + 1, 8), "lower": (dof,), "upper": (dof,), "velocity_limits": (dof,)}
+        for key, shape in shapes.items():
+            value = _readonly(getattr(self, key))
+            if value.shape != shape:
+                raise BadShape(f"{self.name}: {key}", value.shape, str(shape))
+            object.__setattr__(self, key, value)
+        if not np.isfinite(self.chain).all() or np.abs(self.chain).max() > 100.0:
+            raise BadModel(self.name, "chain", "holds a number that is not finite or above 100 m")
+        for name, low, high, speed in zip(self.joint_names, self.lower, self.upper, self.velocity_limits, strict=True):
+            if not low < high:
+                raise BadModel(self.name, name, f"lower limit {low:g} is not below upper limit {high:g}")
+            if not 0 < speed < np.inf:
+                raise BadModel(self.name, name, f"velocity limit {speed:g} is not a positive number")
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def limits(self) -> np.ndarray:
+        """(3, dof): lower and upper limits, largest speeds, as the kernels take them."""
+        return np.stack([self.lower, self.upper, self.velocity_limits])
+
+    def fk(self, q: ArrayLike) -> Pose:
+        """Pose of the tcp in the world at joint positions q (dof,)."""
+        out = np.empty(8)
+        forward_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), out)
+        return Pose(out)
+
+    def jacobian(self, q: ArrayLike) -> np.ndarray:
+        """Jacobian (6, dof) of the tcp's body twist, rows (v, omega); Pinocchio's LOCAL frame."""
+        return self.fk_jacobian(q)[1]
+
+    def fk_jacobian(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Dual quaternion (8,) of the tcp and body Jacobian (6, dof) in one pass."""
+        x, jacobian = np.empty(8), np.empty((6, self.dof))
+        forward_jacobian_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), jacobian, x)
+        return x, jacobian
+
+    def with_tool(self, tcp_from_tool: Pose) -> Arm:
+        """The same arm with another frame of the hand as its tcp."""
+        row = self.chain[-1]
+        tool = Pose.from_position_quaternion(row[4:7], row[:4]) @ tcp_from_tool
+        chain = np.vstack([self.chain[:-1], [*tool.quaternion, *tool.position, row[7]]])
+        return replace(self, chain=chain)
+
+    def margin(self, q: ArrayLike) -> float:
+        """Smallest distance [rad or m] of q (dof,) to a joint limit; negative outside."""
+        q = np.asarray(q, dtype=np.float64)
+        return float(np.minimum(q - self.lower, self.upper - q).min())
+
+    def checked(self, q: ArrayLike) -> np.ndarray:
+        """Joint positions (dof,) as float64, if they have that shape and are finite."""
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape != (self.dof,):
+            raise BadShape(f"{self.name}: q", q.shape, f"({self.dof},)")
+        if not np.isfinite(q).all():
+            raise NotFinite(f"{self.name}: q", int(np.argmin(np.isfinite(q))))
+        return q
+
+    @staticmethod
+    def from_mujoco(
+        model: Any,
+        joint_names: Sequence[str],
+        *,
+        site: str,
+        velocity_limits: ArrayLike,
+        name: str = "mujoco arm",
+    ) -> Arm:
+        """The chain from the world to a site of a compiled MuJoCo model.
+
+        Args:
+            model: `mujoco.MjModel`; MuJoCo itself is not imported.
+            joint_names: all moving joints between the world and the site, from the base on.
+            site: name of the tool frame.
+            velocity_limits: (dof,) or scalar [rad/s]: MJCF does not hold them.
+            name: for messages.
+        """
+        return Arm._from_data(name, chain_from_mujoco(model, joint_names, site, name), velocity_limits)
+
+    @staticmethod
+    def from_urdf(
+        path: str | Path,
+        *,
+        tcp_frame: str,
+        world_from_base: Pose | None = None,
+        velocity_limits: ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Arm:
+        """The chain from the base to a frame of a URDF file, read by Pinocchio.
+
+        Args:
+            path: URDF file; meshes are not read.
+            tcp_frame: name of a link or joint frame: the tool frame.
+            world_from_base: where the root link stands; default the origin.
+            velocity_limits: (dof,) or scalar [rad/s]; default the file's own.
+            name: for messages; default the file's name.
+        """
+        data = chain_from_urdf(path, tcp_frame, world_from_base)
+        return Arm._from_data(name or Path(path).name, data, velocity_limits)
+
+    @staticmethod
+    def _from_data(name: str, data: ChainData, velocity_limits: ArrayLike | None) -> Arm:
+        speeds = data.velocity if velocity_limits is None else np.asarray(velocity_limits, dtype=np.float64)
+        speeds = np.broadcast_to(speeds, len(data.joint_names))
+        return Arm(name, data.joint_names, data.chain, data.lower, data.upper, speeds)

@@ -1,0 +1,1 @@
+"""The filter below every command."""

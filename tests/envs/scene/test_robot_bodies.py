@@ -1,0 +1,80 @@
+"""The shipped capsules of the robots, and the static scene as shapes."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from onedemo.envs.scene.robot_bodies import fitted_bodies, robot_body
+from onedemo.envs.scene.robots import ROBOTS
+from onedemo.envs.scene.scene import compiled_scene
+from onedemo.planner.errors import UnknownName
+from onedemo.planner.geometry.shapes import Box, Cylinder
+
+
+@pytest.mark.parametrize(
+    "robot", ["Panda", *[pytest.param(name, marks=pytest.mark.slow) for name in sorted(set(ROBOTS) - {"Panda"})]]
+)
+def test_the_shipped_table_is_what_is_fitted(robot):
+    for k, body in enumerate(fitted_bodies(robot)):
+        shipped = robot_body(robot, k)
+        assert shipped.names == body.names
+        # another machine's optimizer may end elsewhere: the same to a millimetre
+        np.testing.assert_allclose(shipped.rows[:, 7], body.rows[:, 7], atol=1e-3)
+
+
+@pytest.mark.parametrize("robot", sorted(ROBOTS))
+def test_the_shipped_capsules_hold_every_corner_of_the_links(robot):
+    scene, body = compiled_scene(robot), robot_body(robot)
+    model, index = scene.model, scene.arms[0]
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    for _ in range(20):
+        q = rng.uniform(index.arm.lower, index.arm.upper)
+        data.qpos[index.qpos] = q
+        mujoco.mj_kinematics(model, data)
+        for joint, name in enumerate(index.arm.joint_names):
+            corners = link_corners(model, data, int(model.joint(name).bodyid[0]))
+            if len(corners):
+                assert outside(body, index.arm, q, joint, corners) <= 1e-5, name
+
+
+def link_corners(model, data, body):
+    """World positions of the mesh corners of a body's collision geoms."""
+    found = []
+    for geom in np.flatnonzero(model.geom_bodyid == body):
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH and model.geom_contype[geom]:
+            mesh = model.geom_dataid[geom]
+            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+            turn = data.geom_xmat[geom].reshape(3, 3)
+            found.append(model.mesh_vert[first : first + count] @ turn.T + data.geom_xpos[geom])
+    return np.concatenate(found) if found else np.zeros((0, 3))
+
+
+def outside(body, arm, q, joint, corners):
+    """How far [m] the farthest corner is outside of all capsules that move with a joint."""
+    from onedemo.planner.collision.robot_arrays import WORLD, place_capsules, robot_work
+    from onedemo.planner.geometry.shapes import pack
+
+    g = robot_work((arm,), (body,), pack(()))
+    place_capsules(g, q, WORLD)
+    best = np.full(len(corners), np.inf)
+    for k in np.flatnonzero(body.rows[:, 0] == joint):
+        a, b = g[WORLD + k, :3], g[WORLD + k, 3:6]
+        t = np.clip((corners - a) @ (b - a) / max((b - a) @ (b - a), 1e-18), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(corners - a - t[:, None] * (b - a), axis=1) - body.rows[k, 7])
+    return best.max()
+
+
+def test_robots_without_a_table_are_named():
+    with pytest.raises(UnknownName, match="known: Panda"):
+        robot_body("R2D2")
+
+
+def test_the_static_scene_is_the_table_and_the_stand():
+    things = {thing.name: thing for thing in compiled_scene("Panda").fixtures}
+    table = things["table"]
+    assert table.shape == Box((0.8, 0.8, 0.05))
+    assert table.pose.position[2] + 0.025 == pytest.approx(0.8)
+    assert things["fixed_mount0_pedestal"].shape == Cylinder(0.18, 0.62)
+    assert "robot0_link0" not in things

@@ -1,0 +1,568 @@
+"""Pairs that are close, how they change with the joints, and steps that are proven to stay clear."""
+
+from __future__ import annotations
+
+import math
+import os
+
+import numpy as np
+import pytest
+from helpers.arms import random_arm
+from helpers.solids import random_pose
+from helpers.strategies import for_all
+from hypothesis import strategies as st
+from soak import facing_pandas, frames_of, panda_body, panda_pairs, random_body, random_obstacles
+
+from onedemo.planner import jit
+from onedemo.planner.collision.clearance import (
+    FIRST,
+    GAP,
+    KEEP,
+    KIND,
+    OTHER,
+    SELF_MARGIN,
+    bound_motion,
+    capsule_distance,
+    find_near,
+    least_room,
+    obstacle_distance,
+    reach_of,
+    room_at,
+    room_of_near,
+    step_stays_clear,
+)
+from onedemo.planner.collision.edge_certificates import is_clear, tool_room, tool_work
+from onedemo.planner.collision.robot_arrays import (
+    BOUNDS,
+    HEADER,
+    HIGH,
+    LOW,
+    N_NEAR,
+    NEAR,
+    NEXT,
+    OBSTACLES,
+    SETTINGS,
+    STEP,
+    W_REACH,
+    WORLD,
+    place_capsules,
+    robot_work,
+)
+from onedemo.planner.geometry import screw
+from onedemo.planner.geometry.pose import Pose
+from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere, pack
+from onedemo.planner.robot.arm import Arm
+from onedemo.planner.robot.body import Body
+from onedemo.planner.safety.barrier import _lay_bounds
+from onedemo.planner.safety.safety_layer import SafetySettings
+
+seeds = st.integers(0, 10**6)
+SHARE = float(os.environ.get("ONEDEMO_SOAK", "1"))
+"""Scales the long runs."""
+lay_bounds = jit.numba.njit(error_model="numpy")(lambda g, q: _lay_bounds(g, q))
+SETTING = SafetySettings(distance=0.01, self_distance=0.015, shell=0.5)
+
+
+def work_of(arm: Arm, body: Body, obstacles, pairs=(), masks=(), setting: SafetySettings = SETTING) -> np.ndarray:
+    return robot_work(
+        [arm],
+        [body],
+        pack(obstacles),
+        masks=masks,
+        margin=setting.distance,
+        pairs=pairs,
+        settings=setting.packed(0.01),
+    )
+
+
+def robot(seed: int, moving: bool = False):
+    """Work array, arm, joints of a random robot among random obstacles, with pairs of its own."""
+    rng = np.random.default_rng(seed)
+    arm = random_arm(seed, int(rng.integers(1, 8)), 0.3)
+    body = random_body(arm, rng)
+    obstacles = random_obstacles(rng)
+    if moving:
+        obstacles = [Obstacle(o.shape, o.pose, rng.normal(size=3) * rng.choice([0.0, 0.3, 2.0])) for o in obstacles]
+    pairs = [(i, j) for i in range(len(body)) for j in range(i + 1, len(body)) if rng.uniform() < 0.4]
+    return work_of(arm, body, obstacles, pairs), arm, body, rng
+
+
+def near_rows(g) -> np.ndarray:
+    first = int(g[HEADER, NEAR])
+    return g[first : first + int(g[HEADER, N_NEAR])]
+
+
+def all_gaps(g, world: int = WORLD) -> dict[tuple, float]:
+    """Distance of every pair, one by one."""
+    capsules, obstacles, pairs = (int(g[HEADER, k]) for k in (2, 3, 4))
+    gaps = {}
+    for c in range(capsules):
+        if g[84 + c, 1] >= 0:
+            for k in range(obstacles):
+                gaps[0, c, k] = obstacle_distance(g, world, c, k, 0.0, 1e3)
+    for i, j in g[OBSTACLES + obstacles : OBSTACLES + obstacles + pairs, :2].astype(int):
+        gaps[1, i, j] = capsule_distance(g, world, i, j)
+    return gaps
+
+
+@for_all(seeds, st.sampled_from([0.02, 0.1, 0.5, 2.0]), max_examples=60)
+def test_the_near_pairs_are_all_that_are_near(seed, shell):
+    g, arm, _, rng = robot(seed)
+    place_capsules(g, rng.uniform(-2, 2, arm.dof), WORLD)
+    least = find_near(g, shell)
+    found = {(int(r[KIND]), int(r[FIRST]), int(r[OTHER])): r[GAP] for r in near_rows(g)}
+    wanted = {pair: gap for pair, gap in all_gaps(g).items() if gap <= shell}
+    assert found.keys() == wanted.keys() and len(near_rows(g)) == len(found)
+    for pair, gap in wanted.items():
+        assert found[pair] == pytest.approx(gap, abs=1e-12)
+    rooms = [gap - (SETTING.self_distance if pair[0] else SETTING.distance) for pair, gap in wanted.items()]
+    if rooms:
+        assert least == pytest.approx(min(rooms), abs=1e-12) == pytest.approx(room_of_near(g, -1, 0.0), abs=1e-12)
+    assert all(r[KEEP] == (SETTING.self_distance if r[KIND] else SETTING.distance) for r in near_rows(g))
+
+
+@for_all(seeds, st.floats(-0.2, 1.0), max_examples=60)
+def test_the_smallest_room_is_that_of_all_pairs_up_to_the_cutoff(seed, cutoff):
+    g, arm, _, rng = robot(seed)
+    q = rng.uniform(-2, 2, arm.dof)
+    place_capsules(g, q, WORLD)
+    rooms = [gap - (SETTING.self_distance if pair[0] else SETTING.distance) for pair, gap in all_gaps(g).items()]
+    least = min([100.0, *rooms])
+    assert room_at(g, q, 0.0, 100.0) == pytest.approx(least, abs=1e-12)
+    assert room_at(g, q, 0.0, cutoff) == pytest.approx(min(least, cutoff), abs=1e-12)
+    assert least_room(g, WORLD, 0.0, 100.0) == room_at(g, q, 0.0, 100.0)
+
+
+@for_all(seeds, max_examples=40)
+def test_capsules_stand_where_independent_kinematics_puts_them(seed):
+    g, arm, body, rng = robot(seed)
+    q = rng.uniform(-3, 3, arm.dof)
+    frames = frames_of(arm, q)
+    for world in (WORLD, NEXT):
+        place_capsules(g, q, world)
+        for c, row in enumerate(body.rows):
+            frame = frames[int(row[0]) + 1]
+            for k in (0, 3):
+                point = frame[:3, :3] @ row[1 + k : 4 + k] + frame[:3, 3]
+                np.testing.assert_allclose(g[world + c, k : k + 3], point, rtol=0, atol=1e-12)
+
+
+def test_masked_pairs_fixed_parts_and_own_margins():
+    arm = random_arm(3, 2, 0.0)
+    body = Body(np.array([[-1, 0, 0, 0, 0, 0, 0.1, 0.05], [1, 0, 0, 0, 0, 0, 0.1, 0.05]]), ("base", "hand"))
+    q = np.zeros(2)
+    at = Pose.from_position_quaternion(frames_of(arm, q)[2][:3, 3] + [0.2, 0, 0])
+    obstacles = [Obstacle(Sphere(0.1), at), Obstacle(Sphere(0.1), margin=0.03)]
+    rooms = {}
+    for masks in ((0, 0), (0b10, 0), (0b01, 0), (0b10, 0b10)):
+        g = work_of(arm, body, obstacles, masks=masks)
+        place_capsules(g, q, WORLD)
+        find_near(g, 10.0)
+        rooms[masks] = [tuple(row[[FIRST, OTHER, KEEP]]) for row in near_rows(g)]
+    assert rooms[0, 0] == rooms[0b01, 0] == [(1, 0, 0.01), (1, 1, 0.03)]
+    assert rooms[0b10, 0] == [(1, 1, 0.03)] and rooms[0b10, 0b10] == []
+
+
+@for_all(seeds, max_examples=60)
+def test_bounds_are_the_derivatives_of_the_distances(seed):
+    """Central differences; the pair's need holds the obstacle's own velocity."""
+    g, arm, _, rng = robot(seed, moving=True)
+    q, n = rng.uniform(-2, 2, arm.dof), arm.dof
+    place_capsules(g, q, WORLD)
+    find_near(g, 0.5)
+    lay_bounds(g, q)
+    rows, first = near_rows(g).copy(), int(g[HEADER, BOUNDS])
+    bounds = g[first : first + len(rows)].copy()
+    for row, bound in zip(rows, bounds, strict=True):
+        if row[GAP] < 1e-3:
+            continue
+
+        def gap(q, seconds, row=row):
+            place_capsules(g, q, NEXT)
+            i, j = int(row[FIRST]), int(row[OTHER])
+            return capsule_distance(g, NEXT, i, j) if row[KIND] else obstacle_distance(g, NEXT, i, j, seconds, 1e3)
+
+        h = 1e-5
+        for i in range(n):
+            e = h * np.eye(n)[i]
+            plus, minus = gap(q + e, 0.0), gap(q - e, 0.0)
+            if abs(plus + minus - 2 * row[GAP]) < 1e-7:  # no kink in between
+                assert bound[i] == pytest.approx((plus - minus) / (2 * h), abs=2e-4)
+        assert not bound[n:16].any()
+        closing = 0.0 if row[KIND] else (gap(q, -h) - gap(q, h)) / (2 * h)
+        room = row[GAP] - row[KEEP] - SETTING.buffer
+        assert bound[32] == pytest.approx(closing - SETTING.alpha * room, abs=2e-4)
+
+
+def test_the_last_bounds_are_the_speeds_that_each_joint_may_have():
+    """Down to its lowest, up to its highest, near its limits at both ends too."""
+    arm = gantry(reach=1.0)
+    g = work_of(arm, POINT, [])
+    for q in ([0.0, 0.0, 0.0], [1.0, -1.0, 0.99], [-0.999, 0.9, 1.0]):
+        q = np.array(q)
+        place_capsules(g, q, WORLD)
+        find_near(g, 0.5)
+        assert lay_bounds(g, q) == 6
+        first = int(g[HEADER, BOUNDS])
+        rows = g[first : first + 6]
+        np.testing.assert_array_equal(rows[:, :3], np.repeat(np.eye(3), 2, axis=0) * np.tile([1, -1], 3)[:, None])
+        gain = SETTING.limit_gain
+        low, high = np.maximum(-1.0, gain * (-1.0 - q)), np.minimum(1.0, gain * (1.0 - q))
+        np.testing.assert_allclose(rows[::2, 32], low, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rows[1::2, 32], -high, rtol=0, atol=1e-12)
+        assert not rows[:, 33].any()
+
+
+def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
+    """Both Pandas, against an obstacle and against each other."""
+    robot, rng = facing_pandas(), np.random.default_rng(0)
+    ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.4, 0, 0.4]))
+    g = robot_work(
+        robot.arms, robot.bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SETTING.packed(0.01)
+    )
+    checked = 0
+    for _ in range(5):
+        q = rng.uniform(g[LOW, :14], g[HIGH, :14])
+        place_capsules(g, q, WORLD)
+        find_near(g, 0.3)
+        lay_bounds(g, q)
+        rows, first = near_rows(g).copy(), int(g[HEADER, BOUNDS])
+        bounds = g[first : first + len(rows), :14].copy()
+        for row, bound in zip(rows, bounds, strict=True):
+            i, j = int(row[FIRST]), int(row[OTHER])
+            if row[GAP] < -0.02:
+                continue
+            slopes = []
+            for e in 1e-6 * np.eye(14):
+                gaps = []
+                for sign in (1, -1):
+                    place_capsules(g, q + sign * e, NEXT)
+                    gap = capsule_distance(g, NEXT, i, j) if row[KIND] else obstacle_distance(g, NEXT, i, j, 0.0, 1e3)
+                    gaps.append(gap)
+                slopes.append((gaps[0] - gaps[1]) / 2e-6)
+            checked += 1
+            np.testing.assert_allclose(bound, slopes, rtol=0, atol=1e-3)
+    assert checked > 20
+
+
+@for_all(seeds, st.floats(-3, 0.5), max_examples=100)
+def test_no_point_of_a_core_goes_farther_than_its_bound(seed, exponent):
+    """Lengths of sampled ways: arms with turning and sliding joints, steps up to half a turn."""
+    rng = np.random.default_rng(seed)
+    arm = random_arm(seed, int(rng.integers(1, 8)), 0.3)
+    body = random_body(arm, rng)
+    g = work_of(arm, body, [])
+    q, step = rng.uniform(-2, 2, arm.dof), 10**exponent * rng.normal(size=arm.dof) * (rng.uniform(size=arm.dof) < 0.7)
+    place_capsules(g, q, WORLD)
+    bound_motion(g, WORLD, step)
+    bound = g[WORLD : WORLD + len(body), W_REACH].copy()
+    places = []
+    for s in np.linspace(0, 1, 60):
+        place_capsules(g, q + s * step, NEXT)
+        ends = g[NEXT : NEXT + len(body), :6].reshape(-1, 2, 3)
+        places.append(np.concatenate([ends, ends.mean(axis=1, keepdims=True)], axis=1))
+    ways = np.linalg.norm(np.diff(places, axis=0), axis=3).sum(axis=0).max(axis=1)
+    assert (ways <= bound + 1e-12).all()
+    # and it is no wild guess for small steps
+    if 10**exponent < 0.01:
+        assert (bound <= 3 * arm.dof * ways + 1e-3).all()
+
+
+def test_the_bound_grows_with_a_lever_that_a_later_joint_lengthens():
+    """An arm folded so that its end is on the first axis: what it sweeps there is not seen at the start."""
+    for seed in range(8):
+        arm = random_arm(seed, 2, 0.0)
+        g = work_of(arm, Body(np.array([[1, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.02]]), ("ball",)), [])
+
+        def farthest_way(q, step, g=g):
+            place_capsules(g, q, WORLD)
+            bound_motion(g, WORLD, step)
+            bound, places = g[WORLD, W_REACH], []
+            for s in np.linspace(0, 1, 200):
+                place_capsules(g, q + s * step, NEXT)
+                places.append(g[NEXT, :3].copy())
+            return bound, np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+
+        turns = [np.array([0.0, turn]) for turn in np.linspace(-3, 3, 121)]
+        folded = min(turns, key=lambda q: farthest_way(q, np.array([0.1, 0.0]))[1])
+        step = np.array([1.5, 1.5])
+        alone = sum(farthest_way(folded, part)[0] for part in (step * [1, 0], step * [0, 1]))
+        bound, way = farthest_way(folded, step)
+        assert way <= bound + 1e-12
+        assert bound > alone + 0.1
+
+
+def test_the_bound_of_one_joint_is_its_arc():
+    arm = random_arm(1, 1, 0.0)
+    body = Body(np.array([[0, 0.3, 0.4, 0.1, 0.3, 0.4, 0.7, 0.02]]), ("rod",))
+    g = work_of(arm, body, [])
+    place_capsules(g, np.zeros(1), WORLD)
+    bound_motion(g, WORLD, np.array([-0.2]))
+    assert g[WORLD, W_REACH] == pytest.approx(0.2 * 0.5, abs=1e-12)
+
+
+# ------------------------------------------------------------------ steps
+
+
+def proven(g, q, step, dt: float) -> bool:
+    """What the guard asks: are all pairs that can matter clear during a step?"""
+    place_capsules(g, q, WORLD)
+    g[STEP, : len(q)] = step
+    find_near(g, reach_of(g, g[STEP], dt))
+    return bool(step_stays_clear(g, q, step, dt))
+
+
+def worst_room(g, q, step, dt: float, count: int = 200) -> float:
+    return min(room_at(g, q + s * step, s * dt, 0.1) for s in np.linspace(0, 1, count + 1))
+
+
+def test_a_step_that_is_proven_clear_is_clear():
+    """Random arms and all shapes, still and moving, plates of 2 mm; steps up to a radian; judged at 200 places."""
+    counts = {True: 0, False: 0}
+    for seed in range(max(10, round(300 * SHARE))):
+        g, arm, _, rng = robot(seed, moving=bool(seed % 2))
+        for _ in range(20):
+            q = rng.uniform(-2, 2, arm.dof)
+            if room_at(g, q, 0.0, 1.0) < 2e-4:
+                continue
+            step, dt = rng.normal(size=arm.dof) * rng.choice([0.01, 0.1, 0.5]), float(rng.choice([0.01, 0.2]))
+            answer = proven(g, q, step, dt)
+            counts[answer] += 1
+            if answer:
+                assert worst_room(g, q, step, dt) >= -1e-9, (seed, q, step)
+    assert SHARE < 1 or min(counts.values()) > 200
+
+
+def test_a_step_with_room_to_spare_is_proven_clear():
+    """Not only safe but useful: few steps that stay 2 mm away from too close are refused."""
+    refused = asked = 0
+    for seed in range(150):
+        g, arm, _, rng = robot(seed, moving=bool(seed % 2))
+        for _ in range(10):
+            q, step = rng.uniform(-2, 2, arm.dof), 0.03 * rng.normal(size=arm.dof)
+            if room_at(g, q, 0.0, 1.0) > 2e-3 and worst_room(g, q, step, 0.02, 50) > 2e-3:
+                asked += 1
+                refused += not proven(g, q, step, 0.02)
+    assert asked > 200 and refused <= 0.01 * asked
+
+
+def gantry(reach: float = 5.0, speed: float = 1.0) -> Arm:
+    """Three sliding joints along x, y and z."""
+    chain = np.zeros((4, 8))
+    half = math.sqrt(0.5)
+    # each joint slides along its own z: turn z to x, then to y, then to z of the world
+    chain[:, :4] = [[half, 0, half, 0], [0.5, -0.5, -0.5, -0.5], [half, half, 0, 0], [1, 0, 0, 0]]
+    chain[:3, 7] = 1.0
+    arm = Arm("gantry", ("x", "y", "z"), chain, np.full(3, -reach), np.full(3, reach), np.full(3, speed))
+    np.testing.assert_allclose(arm.fk([1.0, 2.0, 3.0]).position, [1, 2, 3], rtol=0, atol=1e-12)
+    return arm
+
+
+POINT = Body(np.array([[2, 0, 0, 0, 0, 0, 0, 0.02]]), ("ball",))
+
+
+@pytest.mark.parametrize("speed", [0.5, 3.0, 50.0])
+@pytest.mark.parametrize("thick", [1e-3, 0.05])
+def test_no_step_tunnels_through_a_plate(speed, thick):
+    g = work_of(gantry(), POINT, [Obstacle(Box((1.0, 1.0, thick)))])
+    for slant in (0.0, 0.3):
+        q = np.array([0.0, 0.0, 0.5 * thick + 0.035])
+        step = speed * np.array([slant, 0.0, -1.0])
+        assert not proven(g, q, step, 1.0)
+        assert not proven(g, q + step, -step, 1.0)
+        assert proven(g, q, -0.02 * step / speed, 1.0)
+
+
+def test_a_fast_plate_does_not_tunnel_through_a_robot_at_rest():
+    for velocity in (0.5, 30.0):
+        plate = Obstacle(Box((1.0, 1.0, 1e-3)), Pose.from_position_quaternion([0, 0, -0.3]), (0, 0, velocity))
+        g = work_of(gantry(), POINT, [plate])
+        assert not proven(g, np.zeros(3), np.zeros(3), 1.0)
+        # one that is outrun is clear
+        assert velocity > 1.0 or proven(g, np.zeros(3), np.array([0.0, 0.0, 1.01 * velocity]), 1.0)
+        away = Obstacle(plate.shape, plate.pose, (0, 0, -velocity))
+        assert proven(work_of(gantry(), POINT, [away]), np.zeros(3), np.zeros(3), 1.0)
+
+
+def test_a_short_motion_along_a_plane_is_proven():
+    g = work_of(gantry(), POINT, [Obstacle(Box((4.0, 4.0, 1.0)))])
+    q = np.array([-1.0, 0.3, 0.5 + 0.02 + 0.01 + 1.1e-4])
+    assert proven(g, q, np.array([0.02, -0.02, 0.0]), 1.0)
+    assert not proven(g, q, np.array([0.02, -0.02, -3e-4]), 1.0)
+
+
+def test_sliding_along_a_plane_is_proven_however_long():
+    g = work_of(gantry(), POINT, [Obstacle(Box((4.0, 4.0, 1.0)))])
+    q = np.array([-1.0, 0.3, 0.5 + 0.02 + 0.01 + 1.1e-4])
+    assert proven(g, q, np.array([2.0, -0.5, 0.0]), 1.0)
+
+
+def test_a_pass_by_a_small_ball_is_not_proven_by_two_distances_that_suffice_for_contact():
+    g = work_of(gantry(), POINT, [Obstacle(Sphere(0.001))])
+    q, step = np.array([-0.008, 0.0, 0.030]), np.array([0.016, 0.0, 0.0])
+    assert room_at(g, q, 0.0, 1.0) > 0 and worst_room(g, q, step, 1.0) < -9e-4
+    assert not proven(g, q, step, 1.0)
+
+
+def test_a_path_of_one_joint_bends_towards_the_wall():
+    """What bulges out between the ends is seen, however the wall stands."""
+    chain = np.zeros((2, 8))
+    chain[:, 0] = 1.0
+    arm = Arm("door", ("hinge",), chain, np.array([-3.0]), np.array([3.0]), np.array([50.0]))
+    body = Body(np.array([[0, 0.5, 0, 0, 0.5, 0, 0, 0.02]]), ("edge",))
+    for angle in (0.1, 0.4, 1.0):
+        bulge = 0.5 * (1.0 - math.cos(0.5 * angle))
+        for share, clear in ((0.3, False), (0.9, False), (0.99, False), (1.5, True)):
+            face = 0.5 * math.cos(0.5 * angle) + share * bulge + SETTING.distance + 0.02
+            wall = Obstacle(Box((10, 10, 10)), Pose.from_position_quaternion([face + 5.0, 0, 0]))
+            g = work_of(arm, body, [wall])
+            assert proven(g, np.array([-0.5 * angle]), np.array([angle]), 1.0) == clear
+
+
+def planar_arm() -> Arm:
+    chain = np.zeros((3, 8))
+    chain[:, 0] = 1.0
+    chain[1:, 4] = 0.5
+    return Arm("planar", ("a", "b"), chain, np.full(2, -4.0), np.full(2, 4.0), np.full(2, 50.0))
+
+
+def folded_case(q1: float, step, share: float):
+    """Work array, joints: the tip of a folded arm bends towards a wall in the middle of a step."""
+    tip_body = Body(np.array([[1, 0.5, 0, 0, 0.5, 0, 0, 0.02]]), ("tip",))
+
+    def tip(s):
+        a, b = s * step[0], q1 + s * (step[0] + step[1])
+        return 0.5 * np.array([math.cos(a) + math.cos(b), math.sin(a) + math.sin(b), 0.0])
+
+    chord = tip(1.0) - tip(0.0)
+    off = tip(0.5) - 0.5 * (tip(0.0) + tip(1.0))
+    n = -(off - off @ chord / (chord @ chord) * chord)
+    n /= np.linalg.norm(n)
+    heights = [n @ tip(s) for s in np.linspace(0, 1, 101)]
+    ends, low = min(heights[0], heights[-1]), min(heights)
+    face = ends - share * (ends - low) - SETTING.distance - 0.02
+    turn = Pose.from_position_quaternion(np.zeros(3), [math.cos(a := 0.5 * math.atan2(n[1], n[0])), 0, 0, math.sin(a)])
+    wall = Obstacle(Box((10, 10, 10)), Pose.from_position_quaternion((face - 5.0) * n, turn.quaternion))
+    return work_of(planar_arm(), tip_body, [wall]), np.array([0.0, q1])
+
+
+def test_a_path_that_bends_towards_the_wall_is_not_proven():
+    for q1 in np.linspace(math.pi - 0.1, math.pi + 0.1, 21):
+        for step in ([0.215, 0.2616], [0.14, 0.136], [-0.2, -0.075]):
+            for share in (0.6, 0.75, 0.88):
+                g, q = folded_case(q1, step, share)
+                if proven(g, q, np.array(step), 1.0):
+                    assert worst_room(g, q, np.array(step), 1.0) >= -1e-9
+
+
+def test_a_pair_that_keeps_its_distance_keeps_all_of_it_within_a_step():
+    g = work_of(gantry(), POINT, [Obstacle(Sphere(0.1))])
+    # past the ball: 0.05 mm of room at both ends, 0.05 mm less than none in the middle
+    reach = 0.1 + 0.02 + SETTING.distance
+    x = math.sqrt((reach + 5e-5) ** 2 - (reach - 4e-5) ** 2)
+    q, step = np.array([-x, 0.0, reach - 4e-5]), np.array([2 * x, 0.0, 0.0])
+    assert worst_room(g, q, step, 1.0) < -3e-5
+    assert not proven(g, q, step, 1.0)
+
+
+def test_a_pair_that_is_too_close_may_part_but_not_close_in():
+    g = work_of(gantry(), POINT, [Obstacle(Box((1.0, 1.0, 1.0)))])
+    q = np.array([0.0, 0.0, 0.525])
+    assert proven(g, q, np.array([0.0, 0.0, 0.1]), 1.0)
+    assert proven(g, q, np.array([0.1, 0.0, 0.0]), 1.0)
+    assert not proven(g, q, np.array([0.0, 0.0, -2e-4]), 1.0)
+
+
+def test_a_robot_does_not_hit_itself_within_a_step():
+    """The Panda's own pairs, judged at 50 places."""
+    from helpers.arms import panda
+
+    arm, rng = panda(), np.random.default_rng(0)
+    g, seen = work_of(arm, panda_body(), [], panda_pairs()), [0, 0]
+    for _ in range(3000):
+        q = rng.uniform(arm.lower, arm.upper)
+        step = rng.normal(size=7) * rng.choice([0.02, 0.2])
+        if room_at(g, q, 0.0, 1.0) > 2e-4:
+            answer = proven(g, q, step, 0.05)
+            seen[answer] += 1
+            if answer:
+                assert worst_room(g, q, step, 0.05, 50) >= -1e-9
+    assert min(seen) > 30
+
+
+def test_an_edge_past_a_small_ball_and_a_turn_through_a_plate_are_not_proven():
+    """A slide that comes a little too close half-way, from far and near; a turn on the spot, at the end of a rod."""
+    ball = pack([Obstacle(Sphere(0.001))])
+    g = tool_work(np.array([[0, 0, 0, 0, 0, 0, 0.02]]), ball, margin=0.01)
+    for height in (0.001, 0.02, 0.029, 0.0305):
+        for reach in (0.04, 0.1, 0.5, 2.0):
+            x, y = (tuple(Pose.from_position_quaternion([side * reach, 0, height]).dq) for side in (-1, 1))
+            assert not is_clear(g, x, y, 0.01)
+    x, y = (tuple(Pose.from_position_quaternion([side, 0, 0.0315]).dq) for side in (-1, 1))
+    assert is_clear(g, x, y, 0.01)
+    plate = pack([Obstacle(Box((1.0, 0.001, 1.0)), Pose.from_position_quaternion([0.6, 0, 0]))])
+    g = tool_work(np.array([[0.3, 0, 0, 0.3, 0, 0, 0.02]]), plate, margin=0.01)
+    x, y, away = (
+        tuple(Pose.from_position_quaternion(np.zeros(3), [np.cos(a), 0, 0, np.sin(a)]).dq) for a in (-0.3, 0.5, -0.9)
+    )
+    assert not is_clear(g, x, y, 0.01) and is_clear(g, x, away, 0.01)
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_an_edge_of_a_tool_that_is_proven_clear_is_clear(turning):
+    """Slides and screws, judged at 200 places; and few that are clear are refused."""
+    counts, refused = [0, 0], 0
+    for seed in range(max(25, round(60 * SHARE))):
+        rng = np.random.default_rng(seed)
+        tool = np.column_stack([rng.uniform(-0.1, 0.1, (2, 6)), [0.03, 0.02]])
+        g = tool_work(tool, pack(random_obstacles(rng)), margin=0.01)
+        for _ in range(10):
+            x = random_pose(rng, rng.uniform(-0.6, 0.6, 3))
+            way = random_pose(rng) if turning else Pose.identity()
+            y = Pose.from_position_quaternion(
+                x.position + rng.normal(size=3) * rng.choice([0.01, 0.1, 0.5]),
+                (x @ way).quaternion if turning else x.quaternion,
+            )
+            x, y = tuple(x.dq), tuple(y.dq)
+            if not turning:
+                y = (*x[:4], *y[4:]) if np.allclose(x[:4], y[:4]) else (*x[:4], *(-v for v in y[4:]))
+            answer = bool(is_clear(g, x, y, 0.01))
+            counts[answer] += 1
+            if answer or SHARE >= 1:
+                twist = screw.twist_of(screw.mul(screw.conj(x), y))
+                places = np.linspace(0, 1, 201 if SHARE >= 1 else 51)
+                poses = [screw.mul(x, screw.from_twist(screw.scaled(twist, s))) for s in places]
+                rooms = [tool_room(g, pose, 0.02) for pose in poses]
+                assert not answer or min(rooms) >= -1e-9
+                refused += not answer and min(rooms) > 1e-3
+    assert SHARE < 1 or (min(counts) > 30 and refused <= 3)
+
+
+def test_the_clearance_does_not_depend_on_the_frame_of_the_world():
+    rng = np.random.default_rng(2)
+    arm = random_arm(2, 5, 0.3)
+    body, obstacles = random_body(arm, rng), random_obstacles(rng)
+    body = Body(
+        body.rows[body.rows[:, 0] >= 0], tuple(n for n, r in zip(body.names, body.rows, strict=True) if r[0] >= 0)
+    )
+    moved = random_pose(rng, (0.3, -0.2, 0.5))
+    chain = arm.chain.copy()
+    first = moved @ Pose.from_position_quaternion(chain[0, 4:7], chain[0, :4])
+    chain[0, :4], chain[0, 4:7] = first.quaternion, first.position
+    there = Arm("there", arm.joint_names, chain, arm.lower, arm.upper, arm.velocity_limits)
+    elsewhere = [Obstacle(o.shape, moved @ o.pose) for o in obstacles]
+    for _ in range(50):
+        q = rng.uniform(-2, 2, 5)
+        one, other = work_of(arm, body, obstacles), work_of(there, body, elsewhere)
+        assert room_at(one, q, 0.0, 9.0) == pytest.approx(room_at(other, q, 0.0, 9.0), abs=1e-9)
+
+
+def test_later_means_where_the_obstacle_will_be():
+    ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.1, 0.2, 1.0]), (0.2, 0.3, -0.4))
+    g = work_of(gantry(), POINT, [ball])
+    for seconds in (0.0, 0.5, 1.0):
+        later = work_of(gantry(), POINT, [ball.at(seconds)])
+        here = room_at(g, np.zeros(3), seconds, 9.0)
+        assert here == pytest.approx(room_at(later, np.zeros(3), 0.0, 9.0), abs=1e-12)
+        assert here == pytest.approx(np.linalg.norm(ball.at(seconds).pose.position) - 0.13, abs=1e-12)
+    assert g[SETTINGS, SELF_MARGIN] == 0.015

@@ -1,0 +1,648 @@
+"""Plans: judged by other means, in random scenes of every kind, for several arms, on good and bad input."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from helpers.arms import READY, panda_urdf, random_arm
+from helpers.random_scenes import (
+    KINDS,
+    SETTINGS,
+    SOLVABLE,
+    at,
+    demonstrated,
+    feasible,
+    judged,
+    log_of,
+    panda,
+    problem,
+    solve,
+)
+from helpers.strategies import for_all, st
+
+from onedemo.planner.errors import BadOption, BadShape, NotFinite, UnknownName
+from onedemo.planner.escape.repet import MAX_OBSTACLES, RepetSettings
+from onedemo.planner.geometry.pose import Pose, PosePath
+from onedemo.planner.geometry.shapes import Box, Capsule, Obstacle, Sphere
+from onedemo.planner.imitation.tsia import guide_index, screw_path
+from onedemo.planner.judge.certify import ANGLE_ERROR, POSITION_ERROR, certify
+from onedemo.planner.planning.joint_space_motion import RAMP, After, strayed, timed_on_lines
+from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
+from onedemo.planner.planning.plan import Onward, Plan, Problem
+from onedemo.planner.planning.planner import Planner, plan, plan_batch
+from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.settings import JointSearchSettings, PlanSettings
+from onedemo.planner.robot.arm import Arm
+from onedemo.planner.robot.body import Body
+from onedemo.planner.robot.body_readers import body_from_urdf
+from onedemo.planner.safety.safety_layer import SafetySettings
+
+WAYS = ("direct", "escape", "joint search")
+
+
+def assert_sound(plan: Plan, arm, body, start, goal, obstacles, allowed=(), settings=SETTINGS) -> None:
+    """The plan is a success, starts where it must, and its judge agrees."""
+    assert plan.success and plan.how in WAYS, plan.reason
+    np.testing.assert_array_equal(plan.joints[0], start)
+    certificate = certify(log_of(plan, arm, body, goal, obstacles, settings, allowed))
+    assert certificate.ok, certificate.reasons
+
+
+def same_plan(one: Plan, two: Plan) -> bool:
+    arrays = [np.array_equal(a, b) for a, b in ((one.joints, two.joints), (one.path.dqs, two.path.dqs))]
+    return all(arrays) and one[2:4] == two[2:4] and one[7:11] == two[7:11]
+
+
+# Random scenes
+
+
+def solved_share(kind: str, seeds: range) -> float:
+    """Share of the feasible scenes that are solved; every plan called a success must be one."""
+    solved = lost = 0
+    for seed in seeds:
+        scene = problem(kind, seed)
+        found = solve(scene)
+        if found.success:
+            certificate = judged(scene, found)
+            assert certificate.ok, f"{kind} {seed}: {certificate.reasons}"
+            assert len(found.joints) <= SETTINGS.max_seconds / found.dt + 1 or found.how == "joint search"
+            solved += 1
+        else:
+            assert found.reason and len(found.joints) == 1, f"{kind} {seed}"
+            lost += feasible(scene)
+    return solved / (solved + lost) if solved + lost else 1.0
+
+
+@pytest.mark.parametrize("kind", SOLVABLE)
+def test_random_scenes_are_solved_and_no_success_is_unsound(kind):
+    assert solved_share(kind, range(12)) >= 0.95
+
+
+def test_every_cage_is_an_honest_failure():
+    for seed in range(12):
+        failed = solve(problem("cage", seed))
+        assert not failed.success
+        assert failed.reason in ("no escape found", "node limit reached")
+        assert "trees" in failed.detail if failed.reason == "no escape found" else "4000 nodes" in failed.detail
+        assert failed.tree is None or len(failed.tree.poses) <= SETTINGS.repet.nodes
+        np.testing.assert_array_equal(failed.joints, [problem("cage", seed).start])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SOLVABLE)
+def test_many_random_scenes_are_solved_and_no_success_is_unsound(kind):
+    assert solved_share(kind, range(1000, 1150)) >= 0.95
+
+
+@pytest.mark.slow
+def test_every_one_of_many_cages_is_an_honest_failure():
+    for seed in range(1000, 1150):
+        failed = solve(problem("cage", seed))
+        assert not failed.success and failed.reason
+
+
+def test_a_start_that_is_clear_is_not_called_a_collision():
+    arm, body, _ = panda()
+    for seed in range(150):
+        scene = problem("cage", seed)
+        room = SceneWork.of(arm, body, scene.obstacles, SETTINGS).room(scene.start)
+        assert room >= 0.0 and solve(scene).reason != "start in collision", seed
+
+
+def test_the_generator_is_a_function_of_its_seed():
+    for kind in KINDS:
+        one, two = problem(kind, 5), problem(kind, 5)
+        np.testing.assert_array_equal(one.start, two.start)
+        np.testing.assert_array_equal(one.goal.dq, two.goal.dq)
+        assert not np.array_equal(one.start, problem(kind, 6).start)
+
+
+# What a plan is
+
+
+def free_leg(yaw: float = 0.3) -> tuple[np.ndarray, Pose]:
+    """The usual joints of the Panda, and a goal beside it."""
+    turn = Pose.from_yaw([0, 0, 0], yaw) @ at([0, 0, 0], demonstrated()[-1].quaternion)
+    return panda()[2], at([0.0, 0.2, 1.0], turn.quaternion)
+
+
+@for_all(st.floats(-0.6, 0.6), st.floats(-0.15, 0.1), st.floats(-0.3, 0.3), st.floats(0.9, 1.1), max_examples=15)
+def test_with_nothing_in_the_way_the_end_of_the_demonstration_is_kept(yaw, x, y, z):
+    start, turned = free_leg(yaw)
+    goal = at([x, y, z], turned.quaternion)
+    arm, body, _ = panda()
+    found = Planner(arm, body).plan(demonstrated(), start, goal)
+    assert_sound(found, arm, body, start, goal, ())
+    assert found.how == "direct" and found.detours == 0 and found.tree is None and found.tries == 1
+    certificate = certify(log_of(found, arm, body, goal, ()))
+    assert certificate.deviation < 0.01
+    assert certificate.position_error < POSITION_ERROR and certificate.angle_error < ANGLE_ERROR
+    # the demonstration moved to the goal: the relative motions are kept
+    assert len(found.imitated) == len(demonstrated())
+    for k in (0, len(demonstrated()) // 2):
+        mine, theirs = (path[-1].inverse() @ path[k] for path in (found.imitated, demonstrated()))
+        np.testing.assert_allclose(mine.matrix, theirs.matrix, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", SOLVABLE)
+def test_limits_and_speeds_are_kept_and_told(kind):
+    arm = panda()[0]
+    for seed in range(20, 24):
+        found = solve(problem(kind, seed))
+        if found.success:
+            margins = np.minimum(found.joints - arm.lower, arm.upper - found.joints)
+            assert margins.min() >= 0.0
+            assert found.margin == pytest.approx(margins.min(), abs=1e-12)
+            speeds = np.abs(np.diff(found.joints, axis=0)) / found.dt
+            assert (speeds <= arm.velocity_limits * (1 + 1e-9)).all()
+            gap, angle = arm.fk(found.joints[-1]).gap(problem(kind, seed).goal)
+            assert gap < POSITION_ERROR and angle < ANGLE_ERROR
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_same_seed_gives_the_same_bits(kind):
+    scene = problem(kind, 2)
+    fresh = Planner(panda()[0], scene.body)
+    solve(problem("convex", 1))  # what a planner did before must not matter
+    one = solve(scene)
+    two = fresh.plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=scene.seed)
+    assert same_plan(one, two)
+
+
+def test_a_batch_is_the_same_as_one_by_one():
+    arm, body, _ = panda()
+    scenes = [problem(kind, seed) for kind in ("convex", "clutter", "gap", "trap") for seed in (3, 4, 5)]
+    legs = [Problem(demonstrated(), s.start, s.goal, s.obstacles, s.seed) for s in scenes]
+    alone = [solve(scene) for scene in scenes]
+    for workers in (1, 2, 5):
+        together = plan_batch(legs, arm, body, workers=workers)
+        assert all(same_plan(a, b) for a, b in zip(alone, together, strict=True))
+    assert plan_batch([], arm, body) == []
+    with pytest.raises(BadOption, match="workers"):
+        plan_batch(legs, arm, body, workers=0)
+
+
+def test_the_function_is_the_planner():
+    arm, body, _ = panda()
+    scene = problem("convex", 7)
+    one = plan(demonstrated(), scene.start, scene.goal, scene.obstacles, arm, body, seed=7)
+    assert same_plan(one, solve(scene))
+
+
+def test_what_is_far_away_changes_no_bit():
+    arm, body, _ = panda()
+    start, goal = free_leg()
+    one = Planner(arm, body).plan(demonstrated(), start, goal)
+    two = Planner(arm, body).plan(demonstrated(), start, goal, [Obstacle(Sphere(0.1), at([9.0, 9.0, 9.0]))])
+    assert same_plan(one, two)
+
+
+def test_a_leg_may_leave_along_a_path_of_its_own():
+    arm, body, home = panda()
+    _, goal = free_leg()
+    here = arm.fk(home)
+    up = screw_path(here, at([0, 0, 0.1]) @ here, 0.01)
+    found = Planner(arm, body).plan(demonstrated(), home, goal, leaving=up)
+    assert_sound(found, arm, body, home, goal, ())
+    heights = [arm.fk(q).position for q in found.joints[: len(found.joints) // 2]]
+    nearest = np.linalg.norm(np.array(heights) - up[-1].position, axis=1).min()
+    straight = Planner(arm, body).plan(demonstrated(), home, goal)
+    without = [arm.fk(q).position for q in straight.joints[: len(straight.joints) // 2]]
+    assert nearest < 0.02 < np.linalg.norm(np.array(without) - up[-1].position, axis=1).min()
+
+
+# Contacts, held objects, the next leg
+
+
+def test_wanted_contacts_are_not_in_the_way():
+    arm, empty, home = panda()
+    _, goal = free_leg()
+    body = empty.holding("box", Box((0.05, 0.05, 0.05)), at([0.0, 0.0, 0.04]), arm)
+    under = at([0.0, 0.0, -0.08]) @ goal
+    shelf = Obstacle(Box((0.3, 0.3, 0.06)), at(under.position), name="shelf")
+    planner = Planner(arm, body)
+    assert planner.plan(demonstrated(), home, goal, [shelf]).reason == "goal in collision"
+    touch = [(name, "shelf") for name in ("box", "fingers")]
+    found = planner.plan(demonstrated(), home, goal, [shelf], allowed=touch)
+    assert_sound(found, arm, body, home, goal, [shelf], touch)
+    refused = certify(log_of(found, arm, body, goal, [shelf]))
+    assert not refused.ok, "without leave the judge sees the contact"
+    for pair in (("cup", "shelf"), ("box", "table")):
+        with pytest.raises(UnknownName):
+            planner.plan(demonstrated(), home, goal, [shelf], allowed=[pair])
+
+
+def test_what_is_held_is_led_round_too():
+    arm, empty, home = panda()
+    start, goal = free_leg()
+    middle = 0.5 * (arm.fk(home).position + goal.position)
+    ball = [Obstacle(Sphere(0.04), at([*middle[:2], arm.fk(home).position[2] - 0.22]))]
+    bare = Planner(arm, empty).plan(demonstrated(), start, goal, ball)
+    assert bare.how == "direct"
+    body = empty.holding("stick", Capsule(0.015, 0.2), at([0.0, 0.0, 0.12]), arm)
+    assert not certify(log_of(bare, arm, body, goal, ball)).ok, "with the stick it would hit"
+    found = Planner(arm, body).plan(demonstrated(), start, goal, ball)
+    assert_sound(found, arm, body, start, goal, ball)
+
+
+def test_own_margins_of_obstacles_are_kept():
+    arm, body, home = panda()
+    goal = at([0.0, 0.4, 1.0], free_leg()[1].quaternion)
+    middle = 0.5 * (arm.fk(home).position + goal.position)
+    for margin in (0.0, 0.04):
+        ball = [Obstacle(Sphere(0.03), at(middle), margin=margin)]
+        found = Planner(arm, body).plan(demonstrated(), home, goal, ball)
+        assert_sound(found, arm, body, home, goal, ball)
+        assert certify(log_of(found, arm, body, goal, ball)).clearance >= margin - 1e-6
+
+
+def test_a_posture_from_which_the_next_leg_goes_on_is_preferred():
+    """Where the hand's way is free and the arm's is not, the search may choose."""
+    arm, body, _ = panda()
+    tried = better = 0
+    for seed in range(20):
+        scene = problem("gap", seed)
+        planner = Planner(arm, body)
+        found = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed)
+        if found.how != "joint search":
+            continue
+        lifted = screw_path(scene.goal, at([0.0, 0.0, 0.12]) @ scene.goal, 0.01)
+        looked = planner.plan(
+            demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=Onward(lifted)
+        )
+        assert_sound(looked, arm, body, scene.start, scene.goal, scene.obstacles)
+        onward = [
+            planner.plan(lifted, leg.joints[-1], lifted[-1], scene.obstacles).how == "direct" for leg in (found, looked)
+        ]
+        tried, better = tried + 1, better + onward[1] - onward[0]
+        if tried == 3:
+            break
+    assert tried == 3 and better >= 0
+
+
+# Bad input
+
+
+def test_a_demonstration_of_one_pose_is_a_goal():
+    arm, body, home = panda()
+    goal = at([0.0, 0.4, 1.0], free_leg()[1].quaternion)
+    planner, ball = Planner(arm, body), [Obstacle(Sphere(0.03), at(0.5 * (arm.fk(home).position + goal.position)))]
+    for path in (PosePath(goal.dq[None]), demonstrated()[:1]):
+        for obstacles in ((), ball):
+            found = planner.plan(path, home, goal, obstacles)
+            assert_sound(found, arm, body, home, goal, obstacles)
+            assert found.how == ("escape" if obstacles else "direct")
+
+
+def test_a_leg_of_no_length_is_planned():
+    arm, body, home = panda()
+    here = arm.fk(home)
+    found = Planner(arm, body).plan(PosePath(np.array([here.dq] * 5)), home, here)
+    assert_sound(found, arm, body, home, here, ())
+    assert np.abs(found.joints - home).max() < 1e-2
+
+
+@pytest.mark.parametrize("place", [(3.0, 0.0, 1.0), (0.0, 0.0, 3.0), (-0.56, 0.0, 0.95)])
+def test_a_goal_out_of_reach_is_an_honest_failure(place):
+    arm, body, home = panda()
+    _, near = free_leg()
+    for obstacles in ((), (Obstacle(Sphere(0.05), at([0.3, 0.0, 1.0])),)):
+        failed = Planner(arm, body).plan(demonstrated(), home, at(place, near.quaternion), obstacles)
+        assert failed.reason == "ik_or_limit"
+        np.testing.assert_array_equal(failed.joints, home[None])
+
+
+def test_a_start_or_goal_that_cannot_be_is_named_with_part_and_obstacle():
+    arm, body, home = panda()
+    planner, (_, goal) = Planner(arm, body), free_leg()
+    beyond = home.copy()
+    beyond[3] = arm.upper[3] + 0.01
+    failed = planner.plan(demonstrated(), beyond, goal)
+    assert failed.why == f"start beyond a joint limit: {arm.joint_names[3]} by 0.010 rad"
+    far = Obstacle(Sphere(0.05), at([0.0, 0.0, 9.0]), name="far")
+    tcp = arm.fk(home).position
+    on_hand = [far, Obstacle(Sphere(0.05), at(tcp), name="ball")]
+    failed = planner.plan(demonstrated(), home, goal, on_hand)
+    assert failed.reason == "start in collision" and failed.detail in ("fingers touches ball", "hand touches ball")
+    elbow = [Obstacle(Sphere(0.05), at([-0.56, 0.0, 1.5])), far]
+    failed = planner.plan(demonstrated(), home, goal, elbow)
+    assert failed.reason == "start in collision" and re.fullmatch("link[34] touches obstacle 0", failed.detail)
+    on_goal = [far, Obstacle(Sphere(0.05), at(goal.position), name="cup")]
+    failed = planner.plan(demonstrated(), home, goal, on_goal)
+    assert failed.reason == "goal in collision" and failed.detail in ("fingers touches cup", "hand touches cup")
+    # what is held is named as what it is, and what is near but apart with the distance
+    holding = Planner(arm, body.holding("held", Box((0.05, 0.05, 0.05)), at([0.0, 0.0, 0.04]), arm))
+    for start, end, place in ((home, goal, arm.fk(home)), (home, goal, goal)):
+        below = [Obstacle(Box((0.2, 0.2, 0.02)), at(place.position - [0.0, 0.0, 0.085]), name="shelf")]
+        failed = holding.plan(demonstrated(), start, end, below)
+        which = "goal" if place is goal else "start"
+        assert re.fullmatch(
+            rf"{which} in collision: held (touches shelf|is \d\.\d mm from shelf, which must be 10\.0)", failed.why
+        ), failed.why
+
+
+def test_what_is_too_close_for_a_detour_is_named():
+    arm, body, home = panda()
+    goal = at([0.0, 0.4, 1.0], free_leg()[1].quaternion)
+    wall = Obstacle(Box((2.0, 0.02, 3.0)), at([0.65, 0.2, 1.0]), name="wall")
+    shelf = Obstacle(Box((0.2, 0.2, 0.02)), at(goal.position - [0.0, 0.0, 0.3]), name="shelf")
+    gap = SceneWork.of(arm, body, [shelf], SETTINGS).tool_room(goal) + SETTINGS.safety.distance
+    near = Obstacle(shelf.shape, at([0.0, 0.0, gap - 0.015]) @ shelf.pose, name="shelf")
+    planner = Planner(arm, body, PlanSettings(search=None))
+    failed = planner.plan(demonstrated(), home, goal, [wall, near])
+    assert failed.why == "no room for a detour at the goal: fingers is 15.0 mm from shelf, which must be 20.0"
+    farther = planner.plan(demonstrated(), home, goal, [wall, shelf])
+    assert not farther.success and "no room" not in farther.why
+
+
+def test_a_tree_that_is_stopped_says_so():
+    scene = problem("cage", 1)
+    few = replace(SETTINGS, repet=replace(SETTINGS.repet, nodes=200), search=None)
+    failed = solve(scene, few)
+    assert failed.why == "node limit reached: a tree had 200 nodes, see repet.nodes"
+    assert failed.tree is not None and len(failed.tree.poses) == 200
+    many = replace(SETTINGS, repet=replace(SETTINGS.repet, nodes=200_000, levels=5), search=None)
+    failed = solve(scene, many)
+    assert re.fullmatch(r"no escape found: \d+ nodes in the last of 5 trees", failed.why)
+
+
+def test_no_tree_of_another_leg_is_shown():
+    arm, body, home = panda()
+    _, goal = free_leg()
+    planner = Planner(arm, body)
+    scene = problem("cage", 0)
+    assert planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles).tree is not None
+    assert planner.plan(demonstrated(), home, goal).tree is None
+
+
+# Good plans and fallbacks
+
+
+def suffix_share(plan: Plan) -> float:
+    """Screw length of the imitated path at the end of what is followed, over that behind the guiding pose."""
+    imitated, path = plan.imitated_poses, plan.path_poses
+    count = 0
+    while count < min(len(imitated), len(path)) and np.array_equal(imitated[-1 - count], path[-1 - count]):
+        count += 1
+    lengths = plan.imitated.lengths()
+    guide = guide_index(plan.imitated, SETTINGS.motion.guide)
+    return (lengths[-1] - lengths[len(lengths) - count]) / (lengths[-1] - lengths[guide])
+
+
+def test_fallbacks_are_kept_only_where_nothing_better_is_found():
+    first = replace(SETTINGS, effort=0)
+    better = tried = 0
+    for kind in ("trap", "shelf", "held"):
+        for seed in range(15):
+            scene = problem(kind, seed)
+            one, two = solve(scene, first), solve(scene)
+            if not one.success:
+                continue
+            assert two.success and judged(scene, two).ok
+            assert two.kept >= suffix_share(two) - 1e-9
+            good = one.kept >= SETTINGS.keep and one.end_margin >= SETTINGS.end_margin
+            if good:
+                assert same_plan(one, two), "what is good at the first try is taken"
+                continue
+            tried += 1
+            assert (round(two.kept, 1), two.end_margin) >= (round(one.kept, 1), one.end_margin)
+            better += two.kept > one.kept + 0.05 or two.end_margin > one.end_margin + 0.05
+            assert two.tries <= one.tries + SETTINGS.effort
+    assert tried >= 10 and better >= 0.5 * tried
+
+
+def test_a_plan_that_ends_at_a_joint_limit_is_a_fallback():
+    scene = problem("convex", 0)
+    one, two = solve(scene, replace(SETTINGS, effort=0)), solve(scene)
+    assert one.success and one.end_margin < SETTINGS.end_margin < two.end_margin
+    assert judged(scene, two).ok
+
+
+def test_what_stands_in_the_base_is_a_collision_or_nobodys():
+    arm, body, _ = panda()
+    start, goal = free_leg()
+    inside = [Obstacle(Sphere(0.05), at([-0.56, 0.0, 0.95]), name="core")]
+    found = Planner(arm, body).plan(demonstrated(), start, goal, inside)
+    assert found.reason == "start in collision" or certify(log_of(found, arm, body, goal, inside)).ok
+
+
+def test_numbers_that_are_none_and_wrong_shapes_are_one_line():
+    arm, body, home = panda()
+    planner, (_, goal) = Planner(arm, body), free_leg()
+    bad = home.copy()
+    bad[2] = np.nan
+    for start, error in ((bad, NotFinite), (home[:6], BadShape), (home[None], BadShape)):
+        with pytest.raises(error) as caught:
+            planner.plan(demonstrated(), start, goal)
+        assert "\n" not in str(caught.value)
+    many = [Obstacle(Sphere(0.01), at([5, 5, 5]))] * 10_000
+    with pytest.raises(BadOption, match=f"10000; allowed are {MAX_OBSTACLES}"):
+        planner.plan(demonstrated(), home, goal, many)
+
+
+@for_all(st.integers(0, 10**6), max_examples=15)
+def test_any_start_and_goal_give_a_plan_or_a_reason(seed):
+    """Nothing is asked of the draw but that it is finite."""
+    arm, body, _ = panda()
+    rng = np.random.default_rng(seed)
+    start = rng.uniform(arm.lower, arm.upper)
+    goal = arm.fk(rng.uniform(arm.lower, arm.upper))
+    around = [Obstacle(Sphere(0.1), at(rng.normal(size=3))) for _ in range(3)]
+    settings = replace(SETTINGS, search=JointSearchSettings(iterations=300, rounds=1))
+    found = Planner(arm, body, settings).plan(demonstrated(), start, goal, around, seed=seed)
+    if found.success:
+        assert_sound(found, arm, body, start, goal, around)
+    else:
+        assert found.reason
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"tight": 0.0}, {"tight": 1.1}, {"tight": math.nan}, {"biases": ()}, {"spacing": 0.0}, {"max_seconds": 0.0},
+        {"max_seconds": math.inf}, {"repet": RepetSettings(distance=0.012)},
+        {"safety": SafetySettings(distance=0.03)},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_settings_out_of_range_are_refused_in_one_line(values):
+    with pytest.raises(BadOption) as caught:
+        PlanSettings(**values)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "values", [{"step": 0.0}, {"step": 11.0}, {"speed": 0.0}, {"iterations": 0}, {"nodes": 0}, {"rounds": 0}], ids=str
+)
+def test_search_settings_out_of_range_are_refused_in_one_line(values):
+    with pytest.raises(BadOption, match=next(iter(values))):
+        JointSearchSettings(**values)
+
+
+def test_without_search_and_detours_there_is_the_safety_layer_alone():
+    ways = {"all": SETTINGS, "no search": replace(SETTINGS, search=None), "none": replace(SETTINGS, avoid=False)}
+    solved = dict.fromkeys(ways, 0)
+    for name, settings in ways.items():
+        for seed in range(8):
+            scene = problem("gap", seed)
+            found = solve(scene, settings)
+            solved[name] += found.success
+            if found.success:
+                assert judged(scene, found).ok
+                assert found.how in WAYS[: {"all": 3, "no search": 2, "none": 1}[name]]
+    assert solved["none"] < solved["all"] and solved["no search"] < solved["all"] == 8
+
+
+# Any arm, without a simulator
+
+
+def simple_body(arm: Arm) -> Body:
+    """A thin capsule from every joint to the next."""
+    rows = []
+    for k in range(arm.dof):
+        rows.append([k, 0.0, 0.0, 0.0, *arm.chain[k + 1, 4:7], 0.03])
+    return Body(np.array(rows), tuple(f"link{k}" for k in range(arm.dof)))
+
+
+@pytest.mark.parametrize("dof", [6, 7])
+def test_arms_of_any_build_are_planned_for(dof):
+    solved = tried = 0
+    for seed in range(12):
+        arm = random_arm(seed, dof, prismatic=0.1)
+        body, rng = simple_body(arm), np.random.default_rng(seed)
+        start = rng.uniform(-1.0, 1.0, dof)
+        end = start + rng.uniform(-0.5, 0.5, dof)
+        alone = SceneWork.of(arm, body, (), SETTINGS)
+        if min(alone.room(start), alone.room(end)) < 0.0:
+            continue  # folded onto itself
+        here, goal = arm.fk(start), arm.fk(end)
+        path = screw_path(here, goal, 0.01)
+        middle = path[len(path) // 2].position
+        away = Obstacle(Box((0.05, 0.05, 0.05)), at([0.0, 0.0, 0.02]) @ at(middle))
+        scene = SceneWork.of(arm, body, [away], SETTINGS)
+        clear = min(scene.room(start), scene.room(end), scene.tool_room(goal)) > 0.01
+        obstacles, tried = [away] * clear, tried + 1
+        found = Planner(arm, body).plan(path, start, goal, obstacles, seed=seed)
+        if found.success:
+            solved += 1
+            assert_sound(found, arm, body, start, goal, obstacles)
+        else:
+            assert found.reason
+    assert tried >= 6 and solved >= 0.7 * tried
+
+
+def test_an_arm_from_a_urdf_is_planned_for():
+    arm = Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8")
+    body = body_from_urdf(panda_urdf(), arm)
+    here = arm.fk(READY)
+    goal = at([-0.05, 0.35, 0.1]) @ here
+    path = screw_path(here, goal, 0.01)
+    ball = [Obstacle(Sphere(0.05), at(path[len(path) // 2].position))]
+    found = Planner(arm, body).plan(path, READY, goal, ball)
+    assert_sound(found, arm, body, READY, goal, ball)
+    assert found.how == "escape" and found.detours == 1
+
+
+def test_frames_of_the_world_do_not_matter_to_success():
+    """The same leg with the base elsewhere: another world, the same arm."""
+    world = Pose.from_yaw([1.0, -2.0, 0.5], 0.8)
+    arms = [Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8", world_from_base=w) for w in (None, world)]
+    plans = []
+    for arm in arms:
+        body = body_from_urdf(panda_urdf(), arm)
+        here = arm.fk(READY)
+        shift = at([0.0, 0.0, 0.0]) if arm is arms[0] else world
+        goal = shift @ at([-0.05, 0.35, 0.1]) @ shift.inverse() @ here
+        path = screw_path(here, goal, 0.01)
+        ball = [Obstacle(Sphere(0.05), at(path[len(path) // 2].position))]
+        plans.append(Planner(arm, body).plan(path, READY, goal, ball))
+        assert_sound(plans[-1], arm, body, READY, goal, ball)
+    assert plans[0].how == plans[1].how == "escape"
+
+
+# Ways through joint space
+
+
+@for_all(st.integers(0, 10**6), st.sampled_from([1e-5, 0.01, 0.3, 3.0]), max_examples=60)
+def test_a_way_in_time_stays_on_its_lines_and_keeps_the_speeds_from_rest_to_rest(seed, size):
+    """Every point is on one of the lines, in order; corners are taken at rest; ramps are kept."""
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(0.0, size, (int(rng.integers(2, 6)), 7)), axis=0)
+    speeds, dt = rng.uniform(0.5, 2.0, 7), 0.02
+    rows = timed_on_lines(points, speeds, dt)
+    assert np.abs(rows[0] - points[0]).max() == 0.0 and np.allclose(rows[-1], points[-1], atol=1e-12)
+    assert (np.abs(np.diff(rows, axis=0)) <= speeds * dt * (1 + 1e-9)).all()
+    accelerations = np.abs(np.diff(np.vstack([rows[:1], rows, rows[-1:]]), n=2, axis=0)) / dt**2
+    assert (accelerations <= 1.01 * speeds / RAMP + 1e-9).all()
+    line, along = 0, 0.0
+    for row in rows[1:]:
+        way = points[line + 1] - points[line]
+        s = float((row - points[line]) @ way / (way @ way))
+        assert along < s <= 1.0 + 1e-9 and np.abs(points[line] + s * way - row).max() < 1e-9
+        along = s
+        if s > 1.0 - 1e-9:
+            line, along = line + 1, 0.0
+    assert line == len(points) - 1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_shortened_ways_keep_their_ends_get_no_longer_and_stay_clear(seed):
+    scene = problem("gap", seed)
+    arm, body, _ = panda()
+    robot = SceneWork.of(arm, body, scene.obstacles, SETTINGS).robot
+    rng, found = np.random.default_rng(seed), 0
+    for _ in range(40):
+        points = np.clip(scene.start + np.cumsum(rng.normal(0.0, 0.12, (6, 7)), axis=0), arm.lower, arm.upper)
+        if not all(joint_edge_is_clear(robot, a, b) for a, b in pairwise(points)):
+            continue
+        path = np.zeros((40, 7))
+        path[:6] = points
+        count = shortcut(robot, path, 6, 100, np.array([seed + 1.0]), np.empty((2, 7)))
+        short = path[:count]
+        np.testing.assert_array_equal(short[[0, -1]], points[[0, -1]])
+        lengths = [np.abs(np.diff(way, axis=0)).max(axis=1).sum() for way in (points, short)]
+        assert lengths[1] <= lengths[0] + 1e-12
+        assert all(joint_edge_is_clear(robot, a, b) for a, b in pairwise(short))
+        found += lengths[1] < 0.9 * lengths[0]
+    assert found
+
+
+def test_how_far_a_tool_strays_is_its_distance_from_the_edges_of_its_path():
+    arm, _, home = panda()
+    start = arm.fk(home)
+    path = screw_path(start, at([0.0, 0.1, 0.0]) @ start, 0.01)
+    assert strayed(arm, home[None], path.dqs) < 1e-12
+    assert strayed(arm, home[None], path[3:].dqs) == pytest.approx(path[3].gap(start)[0], abs=1e-9)
+    lifted = screw_path(at([0.0, -0.005, 0.02]) @ start, at([0.0, 0.1, 0.02]) @ start, 0.01)
+    assert strayed(arm, home[None], lifted.dqs) == pytest.approx(0.02, abs=1e-9)
+    assert strayed(arm, home[None], start.dq[None]) < 1e-12
+
+
+def test_a_leg_that_must_go_on_ends_where_it_can():
+    """Beside a wall the arm can reach the goal in many postures, but only from some of them go straight on."""
+    arm, body, _ = panda()
+    rescued = tried = 0
+    for seed in range(40):
+        scene = problem("gap", seed)
+        plain = solve(scene)
+        if not plain.success:
+            continue
+        lifted = screw_path(scene.goal, at([0.0, 0.0, 0.04]) @ scene.goal, 0.01)
+        planner = Planner(arm, body, SETTINGS)
+        after = After(plain.asked.scene, lifted, must=True)
+        if after.can_be_done(arm, planner._work, plain.joints[-1], SETTINGS):
+            continue
+        tried += 1
+        onward = Onward(lifted, must=True)
+        found = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=onward)
+        assert_sound(found, arm, body, scene.start, scene.goal, scene.obstacles)
+        assert found.goes_on == after.can_be_done(arm, planner._work, found.joints[-1], SETTINGS)
+        rescued += found.goes_on
+        if tried == 12 or rescued:
+            break
+    assert tried and rescued
