@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cache, partial
-from typing import Any, TypeVar, get_args, get_type_hints
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-
+from ..configs.dataclass_settings import settings_from
 from ..envs.core.description import TaskDescription
-from ..planner.errors import BadConfig, OneDemoError, UnknownName
+from ..planner.errors import BadConfig, UnknownName
 from ..planner.geometry.pose import Pose
 from ..planner.imitation.demonstration import Demonstration
 from ..planner.imitation.tsia import screw_path
@@ -26,13 +25,12 @@ from .motion.baseline_motions import (
     ReplaySettings,
 )
 from .motion.path_generators import straight_path
-from .motion.rrt_motion import SamplingPolicySettings
+from .motion.rrt_motion import RrtPolicySettings
 from .own_policy import is_own, own_policy
 from .policy import Policy
 from .program_policy import ProgramPolicy
 from .screw_policy import ScrewPolicy, ScrewSettings
 
-Settings = TypeVar("Settings")
 OWN_TOOL = "moves the hand itself: only the legs of shipped policies can be moved in another frame of the hand"
 
 
@@ -75,7 +73,7 @@ POLICIES = {
     "dmp-goal": PolicyKind(DmpGoalSettings, join=straight_path),
     "dmp-world": PolicyKind(DmpWorldSettings, join=straight_path),
     "potential": PolicyKind(PotentialSettings),
-    "rrt": PolicyKind(SamplingPolicySettings),
+    "rrt": PolicyKind(RrtPolicySettings),
     **{name: PolicyKind(LearnedSettings, partial(_learned, name)) for name in (*METHODS, METHOD)},
 }
 
@@ -120,35 +118,3 @@ def settings_of(name: str, settings: Mapping[str, Any] | None = None) -> Any:
         raise UnknownName("policy", name, POLICIES)
     kind = POLICIES[name]
     return settings_from(kind.settings, {**kind.preset, **(settings or {})}, f"settings of {name!r}")
-
-
-def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:
-    """A settings dataclass, nested ones included, from mappings as YAML gives them."""
-    _refuse_unknown(kind, values, source, "")
-    try:
-        return _adapter(kind).validate_python(dict(values), strict=False)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise BadConfig(source, key, f"{first['msg']}, got {first['input']!r}") from None
-    except OneDemoError as error:
-        raise BadConfig(source, "", str(error)) from None
-
-
-@cache
-def _adapter(kind: type) -> TypeAdapter:
-    """Pydantic's view of a dataclass, which takes longer to make than many a path."""
-    return TypeAdapter(kind)
-
-
-def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:
-    """Refuse keys that no field has: validation of dataclasses would pass over them."""
-    # of an optional settings class, the class
-    kind = next((part for part in get_args(kind) if is_dataclass(part)), kind)
-    if not (is_dataclass(kind) and isinstance(values, Mapping)):
-        return
-    allowed, types = [field.name for field in fields(kind)], get_type_hints(kind)
-    for key, value in values.items():
-        if key not in allowed:
-            raise BadConfig(source, f"{prefix}{key}", f"unknown key; allowed: {', '.join(allowed)}")
-        _refuse_unknown(types[key], value, source, f"{prefix}{key}.")

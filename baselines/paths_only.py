@@ -15,16 +15,18 @@ from ..planner.imitation.tsia import final_path, guide_index, imitated_path
 from ..planner.robot.arm import Arm
 from ..planner.robot.body import Body
 from .factory import POLICIES, settings_of
-from .motion.baseline_motions import MadeSettings
-from .motion.motion_method import LegPlanner
-from .motion.tool_obstacles import NearTool
+from .motion.baseline_motions import GeneratedMotionSettings
+from .motion.motion_method import MotionPlanner
+from .motion.tool_obstacles import ToolObstacles
 from .screw_policy import ScrewSettings
 
-PATH_MAKERS = tuple(name for name, kind in POLICIES.items() if issubclass(kind.settings, MadeSettings | ScrewSettings))
+PATH_MAKERS = tuple(
+    name for name, kind in POLICIES.items() if issubclass(kind.settings, GeneratedMotionSettings | ScrewSettings)
+)
 """Policies that make a path of the tcp; what is left makes joints."""
 
 
-def leg_planner(name: str, arm: Arm, body: Body, settings: Mapping[str, Any] | None = None) -> LegPlanner:
+def motion_planner(name: str, arm: Arm, body: Body, settings: Mapping[str, Any] | None = None) -> MotionPlanner:
     """What plans the legs of a policy: `.plan(demonstrated, joints, goal, obstacles)` gives a `Plan` with its joints.
 
     Args:
@@ -34,7 +36,7 @@ def leg_planner(name: str, arm: Arm, body: Body, settings: Mapping[str, Any] | N
         settings: the policy's, as nested mappings.
     """
     chosen = settings_of(name, settings)
-    return chosen.mover.planner(arm, body, chosen.plan)
+    return chosen.motion_method.planner(arm, body, chosen.plan)
 
 
 def made_path(
@@ -71,8 +73,8 @@ def made_path(
     imitated = imitated_path(demonstrated, goal)
     if guide is None:
         guide = guide_index(imitated, chosen.motion.guide)
-    if isinstance(chosen, MadeSettings):
-        return chosen.maker.make(demonstrated, start, goal, guide, NearTool(tool, obstacles)).path
+    if isinstance(chosen, GeneratedMotionSettings):
+        return chosen.generator.make(demonstrated, start, goal, guide, ToolObstacles(tool, obstacles)).path
     path = final_path(start, imitated, guide)
     if not chosen.plan.avoid:
         return path

@@ -13,16 +13,16 @@ from ..planner.geometry.pose import Pose
 from ..planner.imitation.demonstration import Demonstration
 from ..planner.planning.settings import MotionSettings
 from .motion.settings import ProgramSettings
-from .motion.tool_frame import ToolMover
+from .motion.tool_frame import ToolFrameMotion
 from .policy import EpisodePolicy, Observation, PolicyReport
-from .programs.arm_executor import Hand
+from .programs.arm_executor import ArmExecutor
 from .programs.bimanual_pour import BimanualPourProgram
-from .programs.dual_arm_executor import TwoHands
+from .programs.dual_arm_executor import DualArmExecutor
 from .programs.pour import PourProgram
 from .programs.reach import ReachProgram
 from .programs.shelve import ShelveProgram
 from .programs.stack import StackProgram
-from .programs.world_model import Surroundings
+from .programs.world_model import WorldModel
 
 Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram
 PROGRAMS = {
@@ -52,8 +52,8 @@ def at_rate(settings: ProgramSettings, dt: float) -> ProgramSettings:
 class Episode:
     """What the policy remembers of an episode: the hand, the running program and how it ended."""
 
-    def __init__(self, hand: Hand | TwoHands, program: Program):
-        self.hand, self.program = hand, program
+    def __init__(self, hand: ArmExecutor | DualArmExecutor, program: Program):
+        self.executor, self.program = hand, program
         self.actions: Iterator[np.ndarray] | None = program.actions()
         self.ended = PolicyReport()
 
@@ -79,21 +79,28 @@ class ProgramPolicy(EpisodePolicy):
             reason = f"{task.control_mode!r}, but the arm is moved by joint speeds: make the environment with"
             raise BadOption("control_mode", f"{reason} control_mode={CONTROL_MODE!r}")
         self.settings = settings = at_rate(settings, task.control_dt)
-        self.task, self.demonstration = settings.known(task), demonstration
-        self.mover = settings.mover if tool is None else ToolMover(settings.mover, tool)
+        self.task, self.demonstration = settings.visible_part(task), demonstration
+        self.motion_method = settings.motion_method if tool is None else ToolFrameMotion(settings.motion_method, tool)
 
     def begin(self, observation: Observation) -> Episode:
         """A new episode; nothing is planned yet."""
         task, settings = self.task, self.settings
         if len(task.arms) == 2:
-            hands = TwoHands(task, settings, observation, self.mover)
+            hands = DualArmExecutor(task, settings, observation, self.motion_method)
             return Episode(hands, BimanualPourProgram(task, self.demonstration, settings, hands))
-        hand = Hand(task.arms[0], task.bodies[0], settings.reactive, Surroundings(task), observation, mover=self.mover)
+        hand = ArmExecutor(
+            task.arms[0],
+            task.bodies[0],
+            settings.reactive,
+            WorldModel(task),
+            observation,
+            motion_method=self.motion_method,
+        )
         return Episode(hand, PROGRAMS[task.name](task, self.demonstration, settings, hand))
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:
         """The next action of the program; standing still once it has ended or given up."""
-        memory.hand.observation = observation
+        memory.executor.observation = observation
         if memory.actions is not None:
             try:
                 return next(memory.actions)
@@ -102,9 +109,9 @@ class ProgramPolicy(EpisodePolicy):
             except PlanFailed as failure:
                 memory.ended = PolicyReport(True, failure.reason, failure.detail)
             memory.actions = None
-        return memory.hand.still()
+        return memory.executor.still()
 
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
         """What happened in the episode of one environment of the state."""
         episode = state[index]
-        return replace(episode.ended, paths=(*episode.program.paths, *episode.hand.drawn))
+        return replace(episode.ended, paths=(*episode.program.paths, *episode.executor.drawn))

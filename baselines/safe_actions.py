@@ -12,7 +12,7 @@ from ..planner.collision.self_collision import pairs_of
 from ..planner.errors import BadOption
 from ..planner.safety.safety_layer import SafetyLayer, SafetySettings
 from .policy import Observation
-from .programs.world_model import Surroundings
+from .programs.world_model import WorldModel
 
 MARGIN = 0.005
 """Distance [m] to keep from the table and from objects: more than the arm lags, less than a grasp needs."""
@@ -44,7 +44,7 @@ class SafeActions(gym.Wrapper):
             raise BadOption("control_mode", "the safety layer needs joint_velocity")
         self.settings, self._task = settings or SAFE, inner.task
         self._pairs = pairs_of(self._task.arms, self._task.bodies)
-        self._surroundings = Surroundings(self._task, table_margin=MARGIN, margin=MARGIN)
+        self._world_model = WorldModel(self._task, table_margin=MARGIN, margin=MARGIN)
         self._q = np.zeros((len(self._task.arms), self._task.arms[0].dof))
         self._key: tuple[Any, ...] = ()
         self._layer: SafetyLayer | None = None
@@ -76,7 +76,7 @@ class SafeActions(gym.Wrapper):
 
     def _bound_layer(self) -> SafetyLayer:
         """The layer for what is around now; made anew only when something has moved."""
-        obstacles = self._surroundings.seen(self._observation)
+        obstacles = self._world_model.obstacles(self._observation)
         near = tuple(self._near_objects())
         if self._layer is None or self._key[0] is not obstacles or self._key[1] != near:
             self._key = (obstacles, near)
@@ -93,4 +93,4 @@ class SafeActions(gym.Wrapper):
     def _near_objects(self) -> list[str]:
         centers = self._observation["object_pose"][:, :3]
         reach = np.linalg.norm(centers[:, None] - self._observation["tcp_pose"][None, :, :3], axis=2).min(axis=1)
-        return [each.name for each, way in zip(self._task.objects, reach, strict=True) if way < WITHIN_REACH]
+        return [each.name for each, distance in zip(self._task.objects, reach, strict=True) if distance < WITHIN_REACH]

@@ -9,7 +9,7 @@ from ..planner.escape.repet import RepetSettings
 from ..planner.geometry.pose import Pose
 from ..planner.imitation.demonstration import Demonstration
 from ..planner.planning.settings import PlanSettings
-from .motion.motion_method import SCREW, Mover
+from .motion.motion_method import SCREW, MotionMethod
 from .motion.settings import ProgramSettings
 from .program_policy import PROGRAMS, ProgramPolicy
 
@@ -31,7 +31,7 @@ class ScrewSettings(ProgramSettings):
     whole_arm: bool = True
 
     @property
-    def mover(self) -> Mover:
+    def motion_method(self) -> MotionMethod:
         """See `ProgramSettings`."""
         return SCREW
 
@@ -42,7 +42,7 @@ class ScrewSettings(ProgramSettings):
             motion=self.motion, repet=self.repet, safety=self.safety, avoid=self.avoid, guard=self.guard
         )
 
-    def known(self, task: TaskDescription) -> TaskDescription:
+    def visible_part(self, task: TaskDescription) -> TaskDescription:
         """See `ProgramSettings`."""
         if self.whole_arm:
             return task

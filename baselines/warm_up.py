@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..envs.core.description import TaskDescription
-from ..envs.scene.body_clearance import tool_room
+from ..envs.scene.body_clearance import tool_clearance
 from ..planner.geometry.pose import PosePath
 from ..planner.geometry.shapes import pack
 from ..planner.reactive.warm_up import FAR, warm_up
@@ -13,4 +13,4 @@ def warm_up_for(task: TaskDescription) -> None:
     """Compile, or load from the cache, what policies may need for a task; see `planner.warm`."""
     for arm, body in zip(task.arms, task.bodies, strict=True):
         warm_up(arm, body)
-        tool_room(body.tool(arm), PosePath(arm.fk(0.5 * (arm.lower + arm.upper)).dq[None]).dqs, pack((FAR,)))
+        tool_clearance(body.tool(arm), PosePath(arm.fk(0.5 * (arm.lower + arm.upper)).dq[None]).dqs, pack((FAR,)))

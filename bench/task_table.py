@@ -31,20 +31,20 @@ class TaskFacts:
     Attributes:
         id: Gymnasium's.
         error: see `Error`.
-        judged: metrics that no method can have been made for, each with its key in `info`; see `metric_table`.
-        kept: the segment of its demonstration whose motion matters; "" where there is none to compare with.
+        task_metrics: metrics that no method can have been made for, each with its key in `info`; see `metric_table`.
+        compared_segment: the segment of its demonstration whose motion matters; "" where there is none to compare with.
         poured_into: index of the glass that is poured into; None: nothing is poured.
         upright: what is carried should be kept level.
-        shown: the task that its demonstration shows, where that is another one; "" for itself.
+        demonstrated_task: the task that its demonstration shows, where that is another one; "" for itself.
     """
 
     id: str
     error: Error
-    judged: dict[str, str]
-    kept: str = ""
+    task_metrics: dict[str, str]
+    compared_segment: str = ""
     poured_into: int | None = None
     upright: bool = True
-    shown: str = ""
+    demonstrated_task: str = ""
 
 
 OUTSIDE = Error("fraction_outside", "largest share of beads outside", "%", 1e2)
@@ -62,22 +62,24 @@ TASKS = {
         "insert",
         upright=False,
     ),
-    "reach": TaskFacts("onedemo/Reach-v0", OFFSET, {"reach_offset": "position_error"}, upright=False, shown="stack"),
+    "reach": TaskFacts(
+        "onedemo/Reach-v0", OFFSET, {"reach_offset": "position_error"}, upright=False, demonstrated_task="stack"
+    ),
     "place_one": TaskFacts(
         "onedemo/PlaceOne-v0",
         OFFSET,
         {"stack_offset": "position_error", "stack_yaw": "yaw_error"},
         "transfer",
-        shown="stack",
+        demonstrated_task="stack",
     ),
-    "tilt_pour": TaskFacts("onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, shown="pour"),
+    "tilt_pour": TaskFacts("onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, demonstrated_task="pour"),
     "insert_one": TaskFacts(
         "onedemo/InsertOne-v0",
         OFFSET,
         {"insertion_offset": "position_error", "insertion_angle": "angle_error"},
         "insert",
         upright=False,
-        shown="shelve",
+        demonstrated_task="shelve",
     ),
-    "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, shown="pour"),
+    "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, demonstrated_task="pour"),
 }

@@ -15,7 +15,7 @@ from ..planner.geometry.pose import Pose, PosePath
 from ..planner.geometry.shapes import LARGEST, Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
 from ..planner.imitation.demonstration_files import load_demonstration, unit_poses
 from ..planner.imitation.segmentation import resampled
-from .plan_scene_schema import HeldItem, Placed, Recorded, SceneConfig, Solid, checked
+from .plan_scene_schema import HeldItem, Placed, Recorded, SceneConfig, ShapeFields, checked
 from .shipped_files import FOLDER, shipped_demonstration
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
 
@@ -25,7 +25,7 @@ ANYWHERE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class HeldObject:
     """An object in the hand.
 
     Attributes:
@@ -40,7 +40,7 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class PlanScene:
     """A leg to plan, but for the arm, which only higher floors can make.
 
     Attributes:
@@ -59,7 +59,7 @@ class Scene:
     demonstrated: PosePath
     goal: Pose
     obstacles: tuple[Obstacle, ...]
-    held: Held | None
+    held: HeldObject | None
 
     @property
     def name(self) -> str:
@@ -94,7 +94,7 @@ def shipped_scene(name: str) -> Path:
     return known[name]
 
 
-def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> PlanScene:
     """A scene file with `key=value` changes.
 
     Raises:
@@ -116,7 +116,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
             obstacles.append(Obstacle(_shape(item), _placed(item), np.array(item.velocity), item.name, item.margin))
     with _blaming(source, changed, "held"):
         held = None if config.held is None else _held(config.held)
-    return Scene(source, changed, config, demonstrated, goal, tuple(obstacles), held)
+    return PlanScene(source, changed, config, demonstrated, goal, tuple(obstacles), held)
 
 
 def pose_of(placed: Placed) -> Pose:
@@ -187,7 +187,7 @@ def _turn(axis: int, degrees: float) -> Pose:
     return Pose.from_position_quaternion(ANYWHERE, quaternion)
 
 
-def _shape(item: Solid) -> Shape:
+def _shape(item: ShapeFields) -> Shape:
     radius, length = item.radius or 0.0, item.length or 0.0
     if item.shape == "sphere":
         return Sphere(radius)
@@ -201,5 +201,5 @@ def _shape(item: Solid) -> Shape:
     return Mesh(np.array(item.vertices))
 
 
-def _held(item: HeldItem) -> Held:
-    return Held(item.name, _shape(item), _placed(item.tcp_from_object))
+def _held(item: HeldItem) -> HeldObject:
+    return HeldObject(item.name, _shape(item), _placed(item.tcp_from_object))

@@ -68,7 +68,7 @@ class Placed(Strict):
         return self
 
 
-class Solid(Strict):
+class ShapeFields(Strict):
     """A shape: radius for a sphere, radius and length for capsule and cylinder, size for a box, vertices for a mesh."""
 
     shape: Literal["sphere", "capsule", "box", "cylinder", "mesh"]
@@ -78,7 +78,7 @@ class Solid(Strict):
     vertices: list[Point] | None = None
 
     @model_validator(mode="after")
-    def _its_own_sizes(self) -> Solid:
+    def _its_own_sizes(self) -> ShapeFields:
         wanted = SIZES[self.shape]
         for key in ("radius", "length", "size", "vertices"):
             if key in wanted and getattr(self, key) is None:
@@ -88,7 +88,7 @@ class Solid(Strict):
         return self
 
 
-class ObstacleItem(Solid, Placed):
+class ObstacleItem(ShapeFields, Placed):
     """An obstacle: a shape, where it is, and what else the planner's `Obstacle` has."""
 
     velocity: Point = [0.0, 0.0, 0.0]
@@ -96,7 +96,7 @@ class ObstacleItem(Solid, Placed):
     name: str = ""
 
 
-class HeldItem(Solid):
+class HeldItem(ShapeFields):
     """An object in the hand."""
 
     name: str = "held"

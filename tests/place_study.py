@@ -69,7 +69,7 @@ def pouring(robot: str, tries: int, rng: np.random.Generator) -> Iterator[Found]
         around = reach.glass_and_stands(tops)
         places = PourPlaces(tuple(map(tuple, tops.round(3).tolist())), tuple(ready.round(3).tolist()), source)
         standing = Obstacle(source.shape, Pose.from_position_quaternion(tops[0]) @ up(0.5 * source.height))
-        if reach.room(reach.among([*around, standing]), ready) < ROOM:
+        if reach.slack(reach.among([*around, standing]), ready) < ROOM:
             continue
         work = reach.among(around)
         fetched = reach.fetched(places, tops, yaw, ready, work)
@@ -130,7 +130,7 @@ def _before_slots(reach: ShelfReach, front: np.ndarray, yaw: float, rng: np.rand
     )
     for _ in range(TRIES):
         q = reach.solved(reach.before(goals[1]), reach.home + rng.normal(0.0, 0.8, reach.arm.dof))
-        if q is None or reach.room(work, q) < ROOM or any(np.abs(q - other).max() < 0.1 for other in found):
+        if q is None or reach.slack(work, q) < ROOM or any(np.abs(q - other).max() < 0.1 for other in found):
             continue
         ways = [reach.to([reach.before(goal), *reach.insertion(goal)], q, work) for goal in goals]
         if all(way is not None for way in ways):
@@ -146,7 +146,7 @@ def _before_stand(reach: ShelfReach, places: ShelfPlaces, q: np.ndarray) -> np.n
     back = PosePath(reach.carried(up(LIFT) @ hand, before).dqs[::-1])
     lifted = reach.along(back, q, loaded)
     ready = reach.to([hand, hand @ up(-SHORT)], lifted, work)
-    return ready if ready is not None and reach.room(work, ready) >= 0.01 else None
+    return ready if ready is not None and reach.slack(work, ready) >= 0.01 else None
 
 
 def main() -> None:

@@ -27,7 +27,7 @@ from helpers.arms import panda, panda_urdf, random_arm
 from helpers.solids import KINDS, fcl_capsule, fcl_distance, fcl_obstacle, random_pose, random_shape
 
 from onedemo.planner import jit
-from onedemo.planner.collision.clearance import find_near, room_at
+from onedemo.planner.collision.clearance import find_near, slack_at
 from onedemo.planner.collision.robot_arrays import HIGH, LOW, SETTINGS, SPEED, WORLD, place_capsules
 from onedemo.planner.escape.tangent_plane import random_number
 from onedemo.planner.geometry.pose import Pose
@@ -63,11 +63,11 @@ def command(eye, q, mode, state, keep, wanted):
         elif mode == ABSURD:
             wanted[i] = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300, x)[int(6.999 * random_number(state))]
     if mode in (STEEPEST, TOWARDS, GRAZE):
-        here = room_at(eye, q, 0.0, 3.0)
+        here = slack_at(eye, q, 0.0, 3.0)
         for i in range(n):
             before = q[i]
             q[i] = before + 1e-6
-            slope = (room_at(eye, q, 0.0, 3.0) - here) / 1e-6
+            slope = (slack_at(eye, q, 0.0, 3.0) - here) / 1e-6
             q[i] = before
             if mode == STEEPEST:
                 wanted[i] = -10.0 * eye[SPEED, i] * (1.0 if slope > 0.0 else -1.0)
@@ -119,13 +119,13 @@ def drive(g, eye, starts, steps, dt, substeps, state, tally, log):
             for i in range(n):
                 keep[i] = 1.0 if random_number(state) < 0.5 else -1.0
         command(eye, q, mode, state, keep, wanted)
-        room = room_at(eye, q, 0.0, 0.05)
+        room = slack_at(eye, q, 0.0, 0.05)
         status = safe_velocity(g, q, wanted, dt, out)
         worst = 1.0
         for s in range(1, substeps + 1):
             for i in range(n):
                 p[i] = q[i] + s * dt * out[i] / substeps
-            worst = min(worst, room_at(eye, p, 0.0, 0.05))
+            worst = min(worst, slack_at(eye, p, 0.0, 0.05))
         beyond = False
         for i in range(n):
             # not `>`: NaN counts
@@ -252,7 +252,7 @@ def random_scene(seed: int, kind: str = "", tries: int = 300) -> Scene:
         n = layer.joints
         low, high = layer.work[LOW, :n], layer.work[HIGH, :n]
         places = (rng.uniform(low, high) for _ in range(tries))
-        starts = [q for q in places if room_at(layer.work, q, 0.0, 1.0) > 1e-6][:20]
+        starts = [q for q in places if slack_at(layer.work, q, 0.0, 1.0) > 1e-6][:20]
         if starts:
             return Scene(robot, obstacles, layer, np.array(starts), dt)
 

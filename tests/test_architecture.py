@@ -19,8 +19,8 @@ ORDER = {
     "planner": """errors jit strict_json geometry robot collision control imitation log escape safety judge planning
         reactive""",
     "envs": "registration scene simulation core stack pour shelve",
-    "configs": """shipped_files strict_yaml dotted_keys run_config learner_defaults grid learner_values train_config
-        plan_scene_schema plan_scene""",
+    "configs": """shipped_files strict_yaml dotted_keys dataclass_settings run_config learner_defaults grid
+        learner_values train_config plan_scene_schema plan_scene""",
     "baselines": """policy extras warm_up key_poses recording motion programs own_policy program_policy safe_actions
         screw_policy learning factory paths_only""",
     "bench": """console atomic_files statistics provenance interruption task_table method_table demonstrations drawing

@@ -23,7 +23,7 @@ from onedemo.configs.strict_yaml import load_mapping
 from onedemo.planner.errors import PlanFailed
 from onedemo.planner.imitation.demonstration_files import load_demonstration
 from onedemo.planner.planning.plan import Plan
-from onedemo.planner.planning.planning_scene import Layout, SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene, SceneTemplate
 from onedemo.planner.safety.safety_layer import SafetySettings
 
 RESERVED = range(0, 1000)
@@ -33,10 +33,10 @@ LEGS_PER_BLOCK = 2
 
 def touches(plan: Plan) -> bool:
     """True if the arm or what it holds touches an obstacle that nobody showed."""
-    asked = plan.asked
+    asked = plan.request
     strange = [each for each in asked.obstacles if each.name.startswith("obstacle")]
-    scene = SceneWork(Layout(asked.arm, asked.body, SafetySettings(distance=0.0), plan.dt), strange, 0.0)
-    return bool(strange) and min(scene.room(q) for q in plan.joints[::2]) < 0.0
+    scene = PlanningScene(SceneTemplate(asked.arm, asked.body, SafetySettings(distance=0.0), plan.dt), strange, 0.0)
+    return bool(strange) and min(scene.slack(q) for q in plan.joints[::2]) < 0.0
 
 
 def legs_of(policy: Any, observation: Any) -> list[Plan]:

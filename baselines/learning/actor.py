@@ -24,7 +24,7 @@ TWIST = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Training:
+class TrainingInfo:
     """How an actor came about; for the reader and for reports, nothing depends on it.
 
     Attributes:
@@ -65,7 +65,7 @@ class Actor:
             speed of its fastest joint, see `residual.corrected`; (): the network's action is the action.
         config_hash: of the settings of its training, "" if there are none.
         versions: of the packages it was trained with, by name.
-        training: see `Training`.
+        training: see `TrainingInfo`.
 
     Raises:
         BadOption: parts that do not fit together.
@@ -82,7 +82,7 @@ class Actor:
     residual_scale: tuple[float, ...] = ()
     config_hash: str = ""
     versions: Mapping[str, str] = field(default_factory=dict)
-    training: Training = Training("")
+    training: TrainingInfo = TrainingInfo("")
 
     def __post_init__(self):
         size, sizes = self.features.size, self.network.sizes

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...planner.strict_json import Refused, list_of, number_of, numbers_of, table_of, text_of, texts_of
-from .actor import Actor, Training
+from .actor import Actor, TrainingInfo
 from .feature_scaling import Normalization
 from .features import Features
 
@@ -141,8 +141,8 @@ def _architecture(card: Mapping[str, Any], inputs: int) -> tuple[tuple[int, ...]
     return tuple(sizes), text_of("network.activation", table["activation"]), text_of("network.output", table["output"])
 
 
-def _training(value: Any) -> Training:
-    table = table_of("training", value, tuple(field.name for field in fields(Training)))
+def _training(value: Any) -> TrainingInfo:
+    table = table_of("training", value, tuple(field.name for field in fields(TrainingInfo)))
     success = None if table["success"] is None else number_of("training.success", table["success"])
     settings = table["settings"]
     for key, entry in _table("settings", table, "training.").items():
@@ -151,7 +151,7 @@ def _training(value: Any) -> Training:
         elif not isinstance(entry, bool | int | str | None):
             raise Refused(f"training.settings.{key}", "is neither a number, a text, true, false nor null")
     counts = {key: _whole(f"training.{key}", table[key], 0) for key in ("steps", "seed", "demonstrations", "episodes")}
-    return Training(
+    return TrainingInfo(
         algorithm=text_of("training.algorithm", table["algorithm"]),
         success=success,
         seconds=number_of("training.seconds", table["seconds"]),

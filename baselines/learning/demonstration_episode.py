@@ -253,5 +253,5 @@ def _pose(observation: Observation, key: str, index: int) -> Pose:
 
 def _length(start: Pose, end: Pose) -> float:
     """Screw length [m] between two poses."""
-    distance, angle = start.gap(end)
+    distance, angle = start.distance_to(end)
     return math.hypot(distance, METERS_PER_RADIAN * angle)

@@ -15,7 +15,7 @@ from ...envs.core.description import TaskDescription
 from ...planner.errors import BadActor, BadOption
 from ...planner.imitation.demonstration_files import UNREADABLE
 from ..extras import needed
-from .actor import Actor, Training, actor_for
+from .actor import Actor, TrainingInfo, actor_for
 from .actor_card import METHOD as RESIDUAL
 from .actor_card import one_line
 from .feature_scaling import Normalization
@@ -39,7 +39,7 @@ def actor_of(
     normalization: Normalization | None = None,
     residual_scale: Sequence[float] = (),
     config_hash: str = "",
-    training: Training | None = None,
+    training: TrainingInfo | None = None,
 ) -> Actor:
     """The actor of a trained model, once it is known to act as the model does.
 
@@ -79,7 +79,7 @@ def actor_of(
         method=method,
         residual_scale=tuple(map(float, residual_scale)),
         config_hash=config_hash,
-        training=training or Training(type(model).__name__, steps=int(getattr(model, "num_timesteps", 0))),
+        training=training or TrainingInfo(type(model).__name__, steps=int(getattr(model, "num_timesteps", 0))),
     )
 
 

@@ -37,14 +37,14 @@ def corrected(action: np.ndarray, correction: np.ndarray, scale: np.ndarray) -> 
     return np.clip(action + speed * scale * correction, -1.0, 1.0)
 
 
-def told(memory: Episode, task: TaskDescription, action: np.ndarray, taken: np.ndarray) -> None:
+def notify(memory: Episode, task: TaskDescription, action: np.ndarray, taken: np.ndarray) -> None:
     """Let the screw policy know what was taken instead of its action: it goes on from the joints that were commanded.
 
     Otherwise corrections would add up to a way off that nothing leads back from.
     """
     limits = np.stack([arm.velocity_limits for arm in task.arms])
     extra = (taken - action).reshape(len(limits), -1)[:, :-1]
-    memory.hand.q += task.control_dt * (extra * limits).reshape(memory.hand.q.shape)
+    memory.executor.q += task.control_dt * (extra * limits).reshape(memory.executor.q.shape)
 
 
 def default_scale(task: TaskDescription, share: float = SHARE) -> tuple[float, ...]:
@@ -96,7 +96,7 @@ class AroundScrew(gym.Wrapper, gym.utils.RecordConstructorArgs):
         """Act as the screw policy would, corrected."""
         taken = corrected(self.screw_action, np.clip(action, -1.0, 1.0), np.array(self.scale))
         assert self._memory is not None
-        told(self._memory, self._screw.task, self.screw_action, taken)
+        notify(self._memory, self._screw.task, self.screw_action, taken)
         observation, reward, terminated, truncated, info = self.env.step(taken)
         return self._seen(observation), reward, terminated, truncated, info
 
@@ -145,7 +145,7 @@ class ResidualPolicy(EpisodePolicy):
         """The screw policy's action, corrected."""
         action = self.screw.act(observation, memory)
         taken = corrected(action, self.actor({**observation, SCREW_ACTION: action}), self._scale)
-        told(memory, self.screw.task, action, taken)
+        notify(memory, self.screw.task, action, taken)
         return taken
 
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:

@@ -10,7 +10,7 @@ from ...planner.imitation.demonstration import Demonstration
 from .demonstration_episode import Goal, Playback, Transitions, as_shown, demo_episode, held_to_goal, tcp_to_goal
 
 
-class Shown(NamedTuple):
+class SegmentPlayback(NamedTuple):
     """How the demonstration becomes an episode of a task.
 
     Attributes:
@@ -27,11 +27,13 @@ class Shown(NamedTuple):
 BLOCK, BOOK, TARGET = -1, 0, 1
 """Of the objects: the block and the book that are in the hand, and the glass that is poured into."""
 EPISODES = {
-    "reach": Shown("approach", lambda _: tcp_to_goal(), Playback(ending="none", withdraw=0.0)),
+    "reach": SegmentPlayback("approach", lambda _: tcp_to_goal(), Playback(ending="none", withdraw=0.0)),
     # the block is held above its place: what comes before the middle of the path is the way from elsewhere
-    "place_one": Shown("transfer", lambda _: held_to_goal(BLOCK), Playback(begin=0.5)),
-    "tilt_pour": Shown("carry", lambda demo: as_shown(demo, "carry", TARGET), Playback(hold=2.0, withdraw=0.0)),
-    "insert_one": Shown("insert", lambda _: held_to_goal(BOOK), Playback(withdraw=0.2)),
+    "place_one": SegmentPlayback("transfer", lambda _: held_to_goal(BLOCK), Playback(begin=0.5)),
+    "tilt_pour": SegmentPlayback(
+        "carry", lambda demo: as_shown(demo, "carry", TARGET), Playback(hold=2.0, withdraw=0.0)
+    ),
+    "insert_one": SegmentPlayback("insert", lambda _: held_to_goal(BOOK), Playback(withdraw=0.2)),
 }
 """By the task's name."""
 

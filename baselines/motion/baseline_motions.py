@@ -18,67 +18,67 @@ from ...planner.reactive.command import ReactiveSettings
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
 from .dmp import Dmp, DmpSettings
-from .generated_follower import MadeFollower
-from .generated_plan import MadePlanner
-from .motion_method import Follower, LegPlanner, Mover, Relative, ScrewMover
-from .path_generators import Decoupled, Maker, Replay
+from .generated_follower import GeneratedFollower
+from .generated_plan import GeneratedPlanner
+from .motion_method import Follower, MotionMethod, MotionPlanner, Relative, ScrewMotion
+from .path_generators import Decoupled, PathGenerator, Replay
 from .potential import FieldSettings, Potential
 from .settings import ProgramSettings
-from .tool_obstacles import NearTool
+from .tool_obstacles import ToolObstacles
 
 
-class MadeMover:
+class GeneratedMotion:
     """Legs moved along the paths of a maker."""
 
-    def __init__(self, maker: Maker):
-        self._maker = maker
+    def __init__(self, generator: PathGenerator):
+        self._generator = generator
 
-    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> LegPlanner:
-        """See `Mover`."""
-        return MadePlanner(arm, body, settings, self._maker)
+    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> MotionPlanner:
+        """See `MotionMethod`."""
+        return GeneratedPlanner(arm, body, settings, self._generator)
 
     def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
-        """See `Mover`."""
-        return MadeFollower(arm, body, settings, self._maker)
+        """See `MotionMethod`."""
+        return GeneratedFollower(arm, body, settings, self._generator)
 
     def skipped(self, done: int) -> int:
         """All where the whole segment would be done again; none where there is a guiding pose behind them."""
-        return 0 if self._maker.guided else done
+        return 0 if self._generator.guided else done
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """See `Mover`. Of a path that is nowhere what was shown, the same share counts as the way to it."""
+        """See `MotionMethod`. Of a path that is nowhere what was shown, the same share counts as the way to it."""
         guide = guide_index(shown, GUIDE_START)
-        path = self._maker.make(shown, start, shown[-1], guide, NearTool(np.empty((0, 7)), ())).path
-        tail = len(path) - guide_index(path, GUIDE_START) if self._maker.avoids else len(shown)
-        return Relative(path, len(shown) - guide if self._maker.guided else min(tail, len(path)))
+        path = self._generator.make(shown, start, shown[-1], guide, ToolObstacles(np.empty((0, 7)), ())).path
+        tail = len(path) - guide_index(path, GUIDE_START) if self._generator.avoids else len(shown)
+        return Relative(path, len(shown) - guide if self._generator.guided else min(tail, len(path)))
 
-    def way_of_two(self, arms, q, ends, seen, dt) -> None:
+    def dual_arm_path(self, arms, q, ends, seen, dt) -> None:
         """Along their paths."""
 
 
-class DecoupledMover(ScrewMover):
+class DecoupledMotion(ScrewMotion):
     """The method's mover; what one hand does seen from another is interpolated apart, too."""
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """See `Mover`."""
-        return MadeMover(Decoupled()).relative(shown, start)
+        """See `MotionMethod`."""
+        return GeneratedMotion(Decoupled()).relative(shown, start)
 
 
 @dataclass(frozen=True, slots=True)
-class MadeSettings(ProgramSettings):
+class GeneratedMotionSettings(ProgramSettings):
     """Of a policy that moves along the paths of a maker."""
 
     guard: bool = False
 
     @property
     @abstractmethod
-    def maker(self) -> Maker:
+    def generator(self) -> PathGenerator:
         """Of the paths."""
 
     @property
-    def mover(self) -> Mover:
+    def motion_method(self) -> MotionMethod:
         """See `ProgramSettings`."""
-        return MadeMover(self.maker)
+        return GeneratedMotion(self.generator)
 
     @property
     def plan(self) -> PlanSettings:
@@ -87,7 +87,7 @@ class MadeSettings(ProgramSettings):
 
 
 @dataclass(frozen=True, slots=True)
-class DecoupledSettings(MadeSettings):
+class DecoupledSettings(GeneratedMotionSettings):
     """Of `decoupled`: the method without escape trees, search and guard, position and orientation apart.
 
     The blend is the controller's pull, as the method's is, not a path that is followed: a path would be left less
@@ -95,34 +95,34 @@ class DecoupledSettings(MadeSettings):
     """
 
     @property
-    def maker(self) -> Maker:
-        """See `MadeSettings`."""
+    def generator(self) -> PathGenerator:
+        """See `GeneratedMotionSettings`."""
         return Decoupled()
 
     @property
-    def mover(self) -> Mover:
+    def motion_method(self) -> MotionMethod:
         """See `ProgramSettings`."""
-        return DecoupledMover()
+        return DecoupledMotion()
 
     @property
     def plan(self) -> PlanSettings:
         """See `ProgramSettings`."""
-        motion = replace(self.motion, pursuit=replace(self.motion.pursuit, pull="apart"))
+        motion = replace(self.motion, pursuit=replace(self.motion.pursuit, interpolation="decoupled"))
         return PlanSettings(motion=motion, safety=self.safety, search=None, avoid=False, guard=self.guard)
 
 
 @dataclass(frozen=True, slots=True)
-class ReplaySettings(MadeSettings):
+class ReplaySettings(GeneratedMotionSettings):
     """Of `replay`: the demonstration moved rigidly, a straight way to its beginning."""
 
     @property
-    def maker(self) -> Maker:
-        """See `MadeSettings`."""
+    def generator(self) -> PathGenerator:
+        """See `GeneratedMotionSettings`."""
         return Replay()
 
 
 @dataclass(frozen=True, slots=True)
-class PotentialSettings(MadeSettings):
+class PotentialSettings(GeneratedMotionSettings):
     """Of `potential`: TSIA in a potential field.
 
     Attributes:
@@ -132,13 +132,13 @@ class PotentialSettings(MadeSettings):
     field: FieldSettings = field(default_factory=FieldSettings)
 
     @property
-    def maker(self) -> Maker:
-        """See `MadeSettings`."""
+    def generator(self) -> PathGenerator:
+        """See `GeneratedMotionSettings`."""
         return Potential(self.field)
 
 
 @dataclass(frozen=True, slots=True)
-class DmpWorldSettings(MadeSettings):
+class DmpWorldSettings(GeneratedMotionSettings):
     """Of `dmp-world`: a primitive learned in the world's frame.
 
     Attributes:
@@ -148,8 +148,8 @@ class DmpWorldSettings(MadeSettings):
     dmp: DmpSettings = field(default_factory=DmpSettings)
 
     @property
-    def maker(self) -> Maker:
-        """See `MadeSettings`."""
+    def generator(self) -> PathGenerator:
+        """See `GeneratedMotionSettings`."""
         return Dmp(self.dmp, in_goal_frame=False)
 
 
@@ -158,6 +158,6 @@ class DmpGoalSettings(DmpWorldSettings):
     """Of `dmp-goal`: a primitive learned in the goal's frame."""
 
     @property
-    def maker(self) -> Maker:
-        """See `MadeSettings`."""
+    def generator(self) -> PathGenerator:
+        """See `GeneratedMotionSettings`."""
         return Dmp(self.dmp, in_goal_frame=True)

@@ -18,14 +18,14 @@ from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.imitation.tsia import BLEND_STEP, STILL
 from ..extras import needed
-from .path_generators import Made, Maker, straight_path
-from .tool_obstacles import NearTool
+from .path_generators import GeneratedPath, PathGenerator, straight_path
+from .tool_obstacles import ToolObstacles
 
 LEAST_STEPS = 50
 """Steps of the shortest primitive; a longer one has as many as the segment has poses."""
 CLOSE = 5e-4
 """Screw distance to the goal at which it has arrived: [m], and a fifth of it in radians."""
-LEAST_ROOM = 1e-3
+MIN_CLEARANCE = 1e-3
 """Room [m] below which an obstacle counts as no nearer: the direction to it must stay."""
 LONGER = 3.0
 """Time until it is given up, over the demonstration's."""
@@ -59,7 +59,7 @@ class DmpSettings:
                 raise BadOption(name, f"{getattr(self, name)} is not from 0 to a million")
 
 
-class Dmp(Maker):
+class Dmp(PathGenerator):
     """Paths of a primitive that is learned from the segment.
 
     Args:
@@ -73,10 +73,10 @@ class Dmp(Maker):
         self.settings, self._in_goal_frame = settings, in_goal_frame
         self._library = needed("movement_primitives.dmp", "dmp")
 
-    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: NearTool) -> Made:
-        """See `Maker`."""
+    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
+        """See `PathGenerator`."""
         if len(shown) < 2 or shown.lengths()[-1] <= STILL:
-            return Made(straight_path(start, goal, BLEND_STEP))
+            return GeneratedPath(straight_path(start, goal, BLEND_STEP))
         world = goal if self._in_goal_frame else Pose.from_position_quaternion([0.0, 0.0, 0.0])
         learned = shown.moved(shown[-1].inverse()) if self._in_goal_frame else shown
         primitive = self._learned(learned)
@@ -85,8 +85,8 @@ class Dmp(Maker):
         primitive.configure(start_y=state.copy(), goal_y=ends)
         return self._made([(primitive, world, 0, state, np.zeros(6))], near)
 
-    def renewed(self, made: Made, index: int, near: NearTool) -> Made:
-        """See `Maker`."""
+    def renewed(self, made: GeneratedPath, index: int, near: ToolObstacles) -> GeneratedPath:
+        """See `PathGenerator`."""
         if not made.states:
             return made
         return self._made(list(made.states[: index + 1]), near)
@@ -104,7 +104,7 @@ class Dmp(Maker):
         primitive.imitate(t, poses.vectors, regularization_coefficient=self.settings.regularization)
         return primitive
 
-    def _made(self, states: list, near: NearTool) -> Made:
+    def _made(self, states: list, near: ToolObstacles) -> GeneratedPath:
         """Go on from the last state: (primitive, its frame, step, position and quaternion, velocity)."""
         primitive, world, step, y, yd = states[-1]
         coupling = _Coupling(self._library, self.settings, world, near)
@@ -120,7 +120,7 @@ class Dmp(Maker):
             y[3:] /= np.linalg.norm(y[3:])
             states.append((primitive, world, count + 1, y, yd))
         rows = np.array([each[3] for each in states])
-        return Made(PosePath.from_vectors(rows).moved(world), tuple(states))
+        return GeneratedPath(PosePath.from_vectors(rows).moved(world), tuple(states))
 
 
 class _Coupling:
@@ -129,7 +129,7 @@ class _Coupling:
     It is called for the position and for the quaternion, which it leaves alone.
     """
 
-    def __init__(self, library: ModuleType, settings: DmpSettings, world: Pose, near: NearTool):
+    def __init__(self, library: ModuleType, settings: DmpSettings, world: Pose, near: ToolObstacles):
         self._term = library.obstacle_avoidance_acceleration_3d
         self._settings, self._near = settings, near
         self._position, self._quaternion, self._rotation = world.position, world.dq[:4], world.rotation
@@ -144,8 +144,8 @@ class _Coupling:
         position = self._position + self._rotation @ y
         turn = dq.mul(_turning(self._quaternion), _turning(self.turn))[:4]
         for each in self._near.at(position, turn, settings.influence):
-            towards = y - max(each.room, LEAST_ROOM) * (each.normal @ self._rotation)
-            share = 1.0 - max(each.room, 0.0) / each.reach
+            towards = y - max(each.slack, MIN_CLEARANCE) * (each.normal @ self._rotation)
+            share = 1.0 - max(each.slack, 0.0) / each.reach
             total += share * self._term(y, yd, towards, settings.gamma, settings.beta)
         return np.zeros(3), total
 

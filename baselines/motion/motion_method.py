@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Obstacle
 from ...planner.imitation.tsia import GUIDE_START, final_path, guide_index
-from ...planner.planning.plan import Onward, Plan
+from ...planner.planning.plan import NextMotion, Plan
 from ...planner.planning.planner import Planner
 from ...planner.planning.settings import PlanSettings
 from ...planner.reactive.command import Command, ReactiveSettings
@@ -28,7 +28,7 @@ DIRECT, ESCAPE, PATH, JOINTS = "direct", "escape", "path", "joints"
 MADE = (PATH, JOINTS)
 
 
-class LegPlanner(Protocol):
+class MotionPlanner(Protocol):
     """Answers what `planner.planning.Planner` answers."""
 
     arm: Arm
@@ -43,7 +43,7 @@ class LegPlanner(Protocol):
         *,
         allowed: Sequence[tuple[str, str]] = (),
         leaving: PosePath | None = None,
-        onward: Onward | None = None,
+        next_motion: NextMotion | None = None,
         seed: int = 0,
     ) -> Plan:
         """Plan a leg; see `Planner.plan`."""
@@ -65,12 +65,12 @@ class Follower(Protocol):
         ...
 
     def go(
-        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
     ) -> None:
         """Follow a path to its end; see `ReactivePlanner.go`."""
         ...
 
-    def follow(self, plan: Plan, *, loosely: bool = False) -> None:
+    def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """Follow a plan that is to be followed as it is; see `ReactivePlanner.follow`."""
         ...
 
@@ -95,10 +95,10 @@ class Relative(NamedTuple):
     tail: int
 
 
-class Mover(Protocol):
+class MotionMethod(Protocol):
     """How a leg is moved."""
 
-    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> LegPlanner:
+    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> MotionPlanner:
         """What plans legs."""
         ...
 
@@ -107,7 +107,7 @@ class Mover(Protocol):
         ...
 
     def skipped(self, done: int) -> int:
-        """How many poses of a segment are left out that has been begun before the leg, as `Leg.done` says."""
+        """How many poses of a segment are left out that has been begun before the leg, as `MotionChoice.done` says."""
         ...
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
@@ -119,7 +119,7 @@ class Mover(Protocol):
         """
         ...
 
-    def way_of_two(
+    def dual_arm_path(
         self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], seen: Callable[[], np.ndarray], dt: float
     ) -> np.ndarray | str | None:
         """A way of two arms through joint space; None: they move along their paths.
@@ -128,7 +128,7 @@ class Mover(Protocol):
             arms: the arms.
             q: (2, dof) joints now.
             ends: where the two tcps must end.
-            seen: gives both arms among obstacles, see `planner.robot_work`.
+            seen: gives both arms among obstacles, see `planner.robot_arrays`.
             dt: seconds per tick.
 
         Returns:
@@ -137,15 +137,15 @@ class Mover(Protocol):
         ...
 
 
-class ScrewMover:
+class ScrewMotion:
     """TSIA, REPET, the search in joint space, the safety layer; see `Planner` and `ReactivePlanner`."""
 
-    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> LegPlanner:
-        """See `Mover`."""
+    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> MotionPlanner:
+        """See `MotionMethod`."""
         return Planner(arm, body, settings)
 
     def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
-        """See `Mover`."""
+        """See `MotionMethod`."""
         return ReactivePlanner(arm, body, settings)
 
     def skipped(self, done: int) -> int:
@@ -153,12 +153,12 @@ class ScrewMover:
         return 0
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """See `Mover`."""
+        """See `MotionMethod`."""
         guide = guide_index(shown, GUIDE_START)
         return Relative(final_path(start, shown, guide), len(shown) - guide)
 
-    def way_of_two(self, arms, q, ends, seen, dt) -> None:
+    def dual_arm_path(self, arms, q, ends, seen, dt) -> None:
         """Along their paths."""
 
 
-SCREW = ScrewMover()
+SCREW = ScrewMotion()

@@ -14,10 +14,10 @@ import numpy as np
 from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
 from ...planner.imitation.tsia import BLEND_STEP, LEAST_STEP, STILL, imitated_path
-from .tool_obstacles import NearTool
+from .tool_obstacles import ToolObstacles
 
 
-class Made(NamedTuple):
+class GeneratedPath(NamedTuple):
     """A path as made.
 
     Attributes:
@@ -29,7 +29,7 @@ class Made(NamedTuple):
     states: tuple[Any, ...] = ()
 
 
-class Maker(ABC):
+class PathGenerator(ABC):
     """Makes paths of the tcp.
 
     Attributes:
@@ -41,7 +41,7 @@ class Maker(ABC):
     avoids = False
 
     @abstractmethod
-    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: NearTool) -> Made:
+    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
         """A path.
 
         Args:
@@ -52,39 +52,39 @@ class Maker(ABC):
             near: what is around the tool.
         """
 
-    def renewed(self, made: Made, index: int, near: NearTool) -> Made:
+    def renewed(self, made: GeneratedPath, index: int, near: ToolObstacles) -> GeneratedPath:
         """The path with what follows pose `index` made anew; only of a maker that avoids."""
         return made
 
 
-class Decoupled(Maker):
+class Decoupled(PathGenerator):
     """TSIA with lerp and slerp in place of ScLERP: position and orientation of the blend move apart."""
 
     guided = True
 
-    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: NearTool) -> Made:
-        """See `Maker`."""
+    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
+        """See `PathGenerator`."""
         imitated = imitated_path(shown, goal)
         length = imitated.lengths()[-1]
         step = max(length / (len(imitated) - 1), LEAST_STEP) if length > STILL else BLEND_STEP
-        return Made(straight_path(start, imitated[guide], step).joined(imitated[guide:]))
+        return GeneratedPath(straight_path(start, imitated[guide], step).joined(imitated[guide:]))
 
 
-class Replay(Maker):
+class Replay(PathGenerator):
     """The demonstration moved rigidly to the goal, and a straight way to its beginning.
 
     What MimicGen (Mandlekar et al. 2023) does to make data of one segment.
     """
 
-    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: NearTool) -> Made:
-        """See `Maker`."""
+    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
+        """See `PathGenerator`."""
         imitated = imitated_path(shown, goal)
-        return Made(straight_path(start, imitated[0], BLEND_STEP).joined(imitated))
+        return GeneratedPath(straight_path(start, imitated[0], BLEND_STEP).joined(imitated))
 
 
 def straight_path(start: Pose, end: Pose, step: float) -> PosePath:
     """Positions on a straight line, orientations by slerp, at most `step` [m] of screw length apart."""
-    distance, angle = start.gap(end)
+    distance, angle = start.distance_to(end)
     tau = np.linspace(0.0, 1.0, max(1, math.ceil(math.hypot(distance, METERS_PER_RADIAN * angle) / step)) + 1)
     turned = dq.sclerp(_turn(start), _turn(end), tau)[:, :4]
     poses = dq.from_position_quaternion(start.position + tau[:, None] * (end.position - start.position), turned)

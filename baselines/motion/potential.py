@@ -1,6 +1,6 @@
 """TSIA in an artificial potential field: the reference pulls, obstacles push, online and without looking ahead.
 
-The field is Khatib's (1986): `strength (i/room - 1) (i/room)^2` along the normal, i the influence, for the closest
+The field is Khatib's (1986): `strength (i/room - 1) (i/slack)^2` along the normal, i the influence, for the closest
 points of tool and obstacle; near the goal it fades (Ge and Cui 2000): else a goal beside an obstacle could not be
 reached. As in a tree of REPET only the translation is deflected. Where pull and push are equal it stands still:
 a local minimum.
@@ -16,10 +16,10 @@ from ...planner.errors import BadOption
 from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.imitation.tsia import final_path, imitated_path
-from .path_generators import Made, Maker
-from .tool_obstacles import NearTool
+from .path_generators import GeneratedPath, PathGenerator
+from .tool_obstacles import ToolObstacles
 
-LEAST_ROOM = 1e-3
+MIN_CLEARANCE = 1e-3
 """Room [m] below which the push does not grow any more."""
 ARRIVED = 5e-4
 """Offset [m] from the reference that counts as none."""
@@ -54,7 +54,7 @@ class FieldSettings:
             raise BadOption("patience", f"{self.patience} is not from 0 to 100000")
 
 
-class Potential(Maker):
+class Potential(PathGenerator):
     """The TSIA path, deflected by a potential field step by step; where nothing is near, the TSIA path itself."""
 
     guided = True
@@ -63,18 +63,18 @@ class Potential(Maker):
     def __init__(self, settings: FieldSettings):
         self.settings = settings
 
-    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: NearTool) -> Made:
-        """See `Maker`."""
+    def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
+        """See `PathGenerator`."""
         imitated = imitated_path(shown, goal)
         reference = final_path(start, imitated, guide)
         return self._made(reference, [reference.dqs[0]], [(reference, 0, np.zeros(3))], near)
 
-    def renewed(self, made: Made, index: int, near: NearTool) -> Made:
-        """See `Maker`."""
+    def renewed(self, made: GeneratedPath, index: int, near: ToolObstacles) -> GeneratedPath:
+        """See `PathGenerator`."""
         states = list(made.states[: index + 1])
         return self._made(states[-1][0], list(made.path.dqs[: index + 1]), states, near)
 
-    def _made(self, reference: PosePath, rows: list, states: list, near: NearTool) -> Made:
+    def _made(self, reference: PosePath, rows: list, states: list, near: ToolObstacles) -> GeneratedPath:
         """Go on from the last state: (reference, index in it, offset from it (3,))."""
         _, index, offset = states[-1]
         last = len(reference) - 1
@@ -87,16 +87,16 @@ class Potential(Maker):
                 offset = np.zeros(3)
             rows.append(_shifted(reference.dqs[index], offset))
             states.append((reference, index, offset))
-        return Made(PosePath(np.array(rows)), tuple(states))
+        return GeneratedPath(PosePath(np.array(rows)), tuple(states))
 
-    def _change(self, reference: PosePath, index: int, offset: np.ndarray, near: NearTool) -> np.ndarray:
+    def _change(self, reference: PosePath, index: int, offset: np.ndarray, near: ToolObstacles) -> np.ndarray:
         """Of the offset, in one step: the pull of the reference and the push of what is near."""
         settings, position = self.settings, dq.translation(reference.dqs[index])
         change = -settings.pull * offset
         goal = dq.translation(reference.dqs[-1])
         for each in near.at(position + offset, reference.dqs[index, :4], settings.influence):
             left = float(np.linalg.norm((position if each.known else position + offset) - goal))
-            fading, ratio = min(1.0, left / settings.fade) ** 2, each.reach / max(each.room, LEAST_ROOM)
+            fading, ratio = min(1.0, left / settings.fade) ** 2, each.reach / max(each.slack, MIN_CLEARANCE)
             change = change + fading * settings.strength * (ratio - 1.0) * ratio**2 * each.normal
         return change * min(1.0, settings.most / max(float(np.linalg.norm(change)), 1e-12))
 

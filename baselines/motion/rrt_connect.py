@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.collision.clearance import room_at
+from ...planner.collision.clearance import slack_at
 from ...planner.errors import BadOption
 from ...planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
 from ..extras import needed
 
 
 @dataclass(frozen=True, slots=True)
-class SamplingSettings:
+class RrtSettings:
     """A search.
 
     Attributes:
@@ -57,24 +57,24 @@ class SamplingSettings:
                 raise BadOption(name, f"{getattr(self, name)} is not from 0 to 1000")
 
 
-def joint_way(
+def joint_path(
     g: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
     start: np.ndarray,
     goals: Sequence[np.ndarray],
-    settings: SamplingSettings,
+    settings: RrtSettings,
     seed: int = 0,
 ) -> np.ndarray | None:
     """Points (k, n) of a clear way in joint space to the goal that is met first; None if none was found.
 
     Args:
-        g: the robot among obstacles, see `planner.robot_work`.
+        g: the robot among obstacles, see `planner.robot_arrays`.
         low: (n,) joint limits [rad].
         high: same.
         start: (n,) joints.
         goals: (n,) joints each, clear.
-        settings: see `SamplingSettings`.
+        settings: see `RrtSettings`.
         seed: of OMPL's random numbers.
 
     Raises:
@@ -119,7 +119,7 @@ def informed(space: Any, g: np.ndarray) -> Any:
     """What OMPL knows of a space, with the planner's own answer to which states are clear; yet to be set up."""
     ob: Any = needed("ompl.base", "ompl")
     information, dof = ob.SpaceInformation(space), space.getDimension()
-    information.setStateValidityChecker(lambda state: room_at(g, _joints(state, dof), 0.0, 0.1) >= 0.0)
+    information.setStateValidityChecker(lambda state: slack_at(g, _joints(state, dof), 0.0, 0.1) >= 0.0)
     return information
 
 
@@ -137,7 +137,7 @@ class _Search:
     What OMPL calls back knows nothing of these objects: a ring of references through it would never be freed.
     """
 
-    def __init__(self, g: np.ndarray, low: np.ndarray, high: np.ndarray, settings: SamplingSettings):
+    def __init__(self, g: np.ndarray, low: np.ndarray, high: np.ndarray, settings: RrtSettings):
         self._ob: Any = needed("ompl.base", "ompl")
         self._og: Any = needed("ompl.geometric", "ompl")
         self._util: Any = needed("ompl.util", "ompl")

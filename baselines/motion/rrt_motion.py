@@ -9,36 +9,36 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...planner.collision.clearance import room_at
+from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Obstacle
-from ...planner.planning.plan import Onward
+from ...planner.planning.plan import NextMotion
 from ...planner.planning.settings import PlanSettings
 from ...planner.reactive.command import FAILED, Command, ReactiveSettings
 from ...planner.reactive.reactive_planner import ReactivePlanner
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
 from ..extras import needed
-from .motion_method import SCREW, Follower, LegPlanner, Mover, Relative
-from .rrt_connect import SamplingSettings, joint_way, timed
-from .rrt_planner import NO_POSTURE, NO_WAY, SamplingPlanner
+from .motion_method import SCREW, Follower, MotionMethod, MotionPlanner, Relative
+from .rrt_connect import RrtSettings, joint_path, timed
+from .rrt_planner import NO_PATH, NO_POSTURE, RrtPlanner
 from .settings import ProgramSettings
 
 
-class SamplingFollower(ReactivePlanner):
+class RrtFollower(ReactivePlanner):
     """Follows ways through joint space, made from where the arm is; nothing is planned anew."""
 
-    def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, sampling: SamplingSettings):
+    def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, sampling: RrtSettings):
         self._sampling, self._goal = sampling, None
         plan = replace(settings.plan, avoid=False, search=None)
         super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
 
     def go(
-        self, path: PosePath, *, loosely: bool = False, onward: Onward | None = None, strictly: bool = False
+        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
     ) -> None:
         """A leg to the end of a path."""
-        super().go(path, loosely=loosely)
+        super().go(path, exact=exact)
         self._goal = path[-1]
 
     def stop(self) -> None:
@@ -49,49 +49,49 @@ class SamplingFollower(ReactivePlanner):
     def step(self, q: ArrayLike) -> Command:
         """See `ReactivePlanner`."""
         if self._goal is not None and self._joints is None:
-            planner = SamplingPlanner(self.arm, self.body, self.settings.plan, self._sampling)
+            planner = RrtPlanner(self.arm, self.body, self.settings.plan, self._sampling)
             joints = np.asarray(q, dtype=np.float64)
             still = [each for each in self._obstacles if not each.velocity.any()]
-            way = planner.way(joints, self._goal, still, self._known_allowed(still))
+            joints_or_reason = planner.joints_or_reason(joints, self._goal, still, self._known_allowed(still))
             self._goal = None
-            if isinstance(way, str):
-                self.state, self.reason = FAILED, "blocked" if way == NO_WAY else way
+            if isinstance(joints_or_reason, str):
+                self.state, self.reason = FAILED, "blocked" if joints_or_reason == NO_PATH else joints_or_reason
                 self.detail = "no way through joint space was found"
             else:
-                self._joints, self._done, self._plan_now = way, 0, False
+                self._joints, self._done, self._plan_now = joints_or_reason, 0, False
         return super().step(q)
 
     def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
         self._plan_now = False
 
 
-class SamplingMover:
+class RrtMotion:
     """Legs by RRT-Connect."""
 
-    def __init__(self, sampling: SamplingSettings):
+    def __init__(self, sampling: RrtSettings):
         needed("ompl.base", "ompl")
         self._sampling = sampling
 
-    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> LegPlanner:
-        """See `Mover`."""
-        return SamplingPlanner(arm, body, settings, self._sampling)
+    def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> MotionPlanner:
+        """See `MotionMethod`."""
+        return RrtPlanner(arm, body, settings, self._sampling)
 
     def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
-        """See `Mover`."""
-        return SamplingFollower(arm, body, settings, self._sampling)
+        """See `MotionMethod`."""
+        return RrtFollower(arm, body, settings, self._sampling)
 
     def skipped(self, done: int) -> int:
         """None: it looks at the end only."""
         return 0
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """See `Mover`; only its end says something."""
+        """See `MotionMethod`; only its end says something."""
         return SCREW.relative(shown, start)
 
-    def way_of_two(
+    def dual_arm_path(
         self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], seen: Callable[[], np.ndarray], dt: float
     ) -> np.ndarray | str:
-        """See `Mover`."""
+        """See `MotionMethod`."""
         sampling, rng, found, g = self._sampling, np.random.default_rng(0), [[], []], seen()
         low, high = (np.concatenate([getattr(arm, name) for arm in arms]) for name in ("lower", "upper"))
         for arm, now, end, postures in zip(arms, q, ends, found, strict=True):
@@ -102,32 +102,32 @@ class SamplingMover:
                     postures.append(solution)
             postures.sort(key=lambda each: float(np.abs(each - now).max()))
         pairs = [np.concatenate(pair) for pair in product(*found)]
-        pairs = [pair for pair in pairs if room_at(g, pair, 0.0, 0.1) >= 0.0]
+        pairs = [pair for pair in pairs if slack_at(g, pair, 0.0, 0.1) >= 0.0]
         if not pairs:
             return NO_POSTURE
         pairs.sort(key=lambda each: float(np.abs(each - q.ravel()).max()))
-        points = joint_way(g, low, high, q.ravel(), pairs[: sampling.goals], sampling)
+        points = joint_path(g, low, high, q.ravel(), pairs[: sampling.goals], sampling)
         if points is None:
-            return NO_WAY
+            return NO_PATH
         limits = np.concatenate([arm.velocity_limits for arm in arms])
         return timed(points, sampling.speed * limits * dt).reshape(-1, *q.shape)
 
 
 @dataclass(frozen=True, slots=True)
-class SamplingPolicySettings(ProgramSettings):
+class RrtPolicySettings(ProgramSettings):
     """Of `rrt`.
 
     Attributes:
-        sampling: see `SamplingSettings`.
+        sampling: see `RrtSettings`.
     """
 
     guard: bool = False
-    sampling: SamplingSettings = field(default_factory=SamplingSettings)
+    sampling: RrtSettings = field(default_factory=RrtSettings)
 
     @property
-    def mover(self) -> Mover:
+    def motion_method(self) -> MotionMethod:
         """See `ProgramSettings`."""
-        return SamplingMover(self.sampling)
+        return RrtMotion(self.sampling)
 
     @property
     def plan(self) -> PlanSettings:

@@ -13,15 +13,15 @@ from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Obstacle
 from ...planner.imitation.tsia import imitated_path, screw_path
-from ...planner.planning.plan import Asked, Onward, Plan
-from ...planner.planning.planning_scene import Layout, SceneWork, checked_obstacles
+from ...planner.planning.plan import NextMotion, Plan, PlanRequest
+from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from ...planner.planning.settings import PlanSettings
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
 from .motion_method import JOINTS
-from .rrt_connect import SamplingSettings, joint_way, timed
+from .rrt_connect import RrtSettings, joint_path, timed
 
-NO_WAY, NO_POSTURE = "no way found", "ik_or_limit"
+NO_PATH, NO_POSTURE = "no way found", "ik_or_limit"
 MORE = 3
 """How often the starts of the inverse kinematics are doubled."""
 APPROACH_STEP = 0.01
@@ -40,12 +40,12 @@ class Posture(NamedTuple):
     rest: np.ndarray
 
 
-class SamplingPlanner:
-    """Plans legs of one arm by RRT-Connect; see `mover.LegPlanner`."""
+class RrtPlanner:
+    """Plans legs of one arm by RRT-Connect; see `motion_method.MotionPlanner`."""
 
-    def __init__(self, arm: Arm, body: Body, settings: PlanSettings, sampling: SamplingSettings):
+    def __init__(self, arm: Arm, body: Body, settings: PlanSettings, sampling: RrtSettings):
         self.arm, self.body, self.settings, self.sampling = arm, body, settings, sampling
-        self._layout = Layout(arm, body, settings.safety, settings.motion.dt)
+        self._layout = SceneTemplate(arm, body, settings.safety, settings.motion.dt)
         self._low = np.maximum(arm.lower, -np.pi) + sampling.margin
         self._high = np.minimum(arm.upper, np.pi) - sampling.margin
 
@@ -58,28 +58,29 @@ class SamplingPlanner:
         *,
         allowed: Sequence[tuple[str, str]] = (),
         leaving: PosePath | None = None,
-        onward: Onward | None = None,
+        next_motion: NextMotion | None = None,
         seed: int = 0,
     ) -> Plan:
         """Plan a leg; see `Planner.plan`. Of what was demonstrated only its end is looked at."""
         begun, q = time.perf_counter(), self.arm.checked(start)
-        asked = Asked(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings, demonstrated)
+        asked = PlanRequest(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings, demonstrated)
         joints, reason = q[None], ""
         for end in [goal] if leaving is None else [leaving[-1], goal]:
-            way = self.way(joints[-1], end, obstacles, allowed, seed)
-            if isinstance(way, str):
-                joints, reason = q[None], way
+            joints_or_reason = self.joints_or_reason(joints[-1], end, obstacles, allowed, seed)
+            if isinstance(joints_or_reason, str):
+                joints, reason = q[None], joints_or_reason
                 break
-            joints = np.vstack([joints, way[1:]])
+            joints = np.vstack([joints, joints_or_reason[1:]])
         rows = [*joints[: -1 : max(1, len(joints) // 100)], joints[-1]]
         path = PosePath(np.array([self.arm.fk(row).dq for row in rows]))
         margin = min(self.arm.margin(row) for row in joints) if not reason else -np.inf
         return Plan(
             joints, self.settings.motion.dt, reason, JOINTS, imitated_path(demonstrated, goal).dqs, path.dqs,
-            np.empty((0, 8)), 0, margin, 0, 1, time.perf_counter() - begun, asked, kept=0.0 if reason else 1.0,
+            np.empty((0, 8)), 0, margin, 0, 1, time.perf_counter() - begun, asked,
+            imitated_share=0.0 if reason else 1.0,
         )  # fmt: skip
 
-    def way(
+    def joints_or_reason(
         self,
         q: np.ndarray,
         goal: Pose,
@@ -89,22 +90,22 @@ class SamplingPlanner:
     ) -> np.ndarray | str:
         """Joints (t, dof) at every tick from q to the goal, or why there are none."""
         distance = self.settings.safety.distance
-        scene = SceneWork(self._layout, checked_obstacles(obstacles), distance, allowed)
-        strict = SceneWork(self._layout, checked_obstacles(obstacles), distance)
+        scene = PlanningScene(self._layout, checked_obstacles(obstacles), distance, allowed)
+        strict = PlanningScene(self._layout, checked_obstacles(obstacles), distance)
         postures = self._postures(q, goal, scene, strict)
         if not postures:
             return NO_POSTURE
         # what is touched on purpose is touched on the straight end only, if there is one
-        free = strict if min(strict.room(each) for each in (q, *(p.first for p in postures))) >= 0.0 else scene
+        free = strict if min(strict.slack(each) for each in (q, *(p.first for p in postures))) >= 0.0 else scene
         firsts = [each.first for each in postures]
-        points = joint_way(free.seen, self.arm.lower, self.arm.upper, q, firsts, self.sampling, seed)
+        points = joint_path(free.seen, self.arm.lower, self.arm.upper, q, firsts, self.sampling, seed)
         if points is None:
-            return NO_WAY
+            return NO_PATH
         met = min(postures, key=lambda each: float(np.abs(each.first - points[-1]).max()))
         step = self.sampling.speed * self.arm.velocity_limits * self.settings.motion.dt
         return timed(np.vstack([points, met.rest]), step)
 
-    def _postures(self, q: np.ndarray, goal: Pose, scene: SceneWork, strict: SceneWork) -> list[Posture]:
+    def _postures(self, q: np.ndarray, goal: Pose, scene: PlanningScene, strict: PlanningScene) -> list[Posture]:
         """Clear postures of the goal, the nearest first; if there are any, those that touch on a straight end only."""
         rng, found, seeds = np.random.default_rng(0), [], self.sampling.seeds
         for k in range(seeds * 2**MORE):
@@ -120,10 +121,10 @@ class SamplingPlanner:
         nothing = np.empty((0, self.arm.dof))
         return (gentle or [Posture(each, nothing) for each in found])[: self.sampling.goals]
 
-    def _ended(self, q: np.ndarray, goal: Pose, scene: SceneWork, strict: SceneWork) -> Posture | None:
+    def _ended(self, q: np.ndarray, goal: Pose, scene: PlanningScene, strict: PlanningScene) -> Posture | None:
         """A posture with a straight end, if it touches something: along the fingers, or from above what is held."""
         length = self.sampling.approach
-        if strict.room(q) >= 0.0:
+        if strict.slack(q) >= 0.0:
             return Posture(q, np.empty((0, self.arm.dof)))
         if length <= 0.0:
             return None
@@ -135,7 +136,7 @@ class SamplingPlanner:
             if row is None or not self._is_clear(row, scene) or np.abs(row - rows[-1]).max() > 0.5:
                 return None
             rows.append(row)
-        return Posture(rows[-1], np.array(rows[-2::-1])) if strict.room(rows[-1]) >= 0.0 else None
+        return Posture(rows[-1], np.array(rows[-2::-1])) if strict.slack(rows[-1]) >= 0.0 else None
 
-    def _is_clear(self, q: np.ndarray, scene: SceneWork) -> bool:
-        return bool((q >= self._low).all() and (q <= self._high).all()) and scene.room(q) >= 0.0
+    def _is_clear(self, q: np.ndarray, scene: PlanningScene) -> bool:
+        return bool((q >= self._low).all() and (q <= self._high).all()) and scene.slack(q) >= 0.0

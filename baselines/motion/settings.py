@@ -10,7 +10,7 @@ from ...planner.errors import BadOption
 from ...planner.planning.settings import MotionSettings, PlanSettings
 from ...planner.reactive.command import ReactiveSettings
 from ...planner.safety.safety_layer import SafetySettings
-from .motion_method import Mover
+from .motion_method import MotionMethod
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class ProgramSettings(ABC):
 
     @property
     @abstractmethod
-    def mover(self) -> Mover:
+    def motion_method(self) -> MotionMethod:
         """How a leg is moved."""
 
     @property
@@ -61,7 +61,7 @@ class ProgramSettings(ABC):
     def plan(self) -> PlanSettings:
         """The settings as planners take them."""
 
-    def known(self, task: TaskDescription) -> TaskDescription:
+    def visible_part(self, task: TaskDescription) -> TaskDescription:
         """What of a task is looked at; all of it."""
         return task
 

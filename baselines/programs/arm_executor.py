@@ -13,14 +13,14 @@ from ...planner.errors import PlanFailed
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Shape
 from ...planner.imitation.tsia import final_path
-from ...planner.planning.plan import Onward, Plan
+from ...planner.planning.plan import NextMotion, Plan
 from ...planner.reactive.command import DONE, ESCAPING, FAILED, Command, ReactiveSettings
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
-from ..motion.motion_method import ESCAPE, PATH, SCREW, Mover
+from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
 from ..policy import LabeledPath, Observation
-from .goal_choice import Choice, Leg, choose, way_out
-from .world_model import Surroundings
+from .goal_choice import ChosenMotion, MotionChoice, choose, departure_path
+from .world_model import WorldModel
 
 OPEN, CLOSE = -1.0, 1.0
 LOST = 0.03
@@ -43,7 +43,7 @@ class _Held(NamedTuple):
     guarded: Pose
 
 
-class Hand:
+class ArmExecutor:
     """Commanded joints and gripper of one arm, what is around it, and the latest observation.
 
     The loop is closed on the joints that were commanded, not on those measured: the servos lag by 40 ms, and
@@ -62,20 +62,20 @@ class Hand:
         arm: Arm,
         body: Body,
         settings: ReactiveSettings,
-        surroundings: Surroundings,
+        world_model: WorldModel,
         observation: Observation,
         index: int = 0,
         *,
-        mover: Mover = SCREW,
+        motion_method: MotionMethod = SCREW,
     ):
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
-        self.observation, self.surroundings = observation, surroundings
+        self.observation, self.world_model = observation, world_model
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
         self._held: _Held | None = None
         self.drawn: list[LabeledPath] = []
         self._escape: list[np.ndarray] = []
-        self.mover, self._planner = mover, mover.follower(arm, body, settings)
+        self.motion_method, self._planner = motion_method, motion_method.follower(arm, body, settings)
 
     @property
     def measured_tcp(self) -> Pose:
@@ -93,12 +93,12 @@ class Hand:
     def slow_down(self, pace: float) -> None:
         """From now on use a share of the joints' speed limits; the hand must be on no path."""
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
-        self._planner = self.mover.follower(self.arm, self._planner.body, self._planner.settings)
+        self._planner = self.motion_method.follower(self.arm, self._planner.body, self._planner.settings)
 
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
         """From now on object `index` is part of the arm, and no longer around it."""
         self._held = _Held(index, shape, tcp_from_object, tcp_from_object)
-        self.surroundings.without(index)
+        self.world_model.exclude(index)
         self._planner.hold(self.body_with(shape, tcp_from_object))
 
     def tcp_from(self, index: int) -> Pose:
@@ -113,8 +113,8 @@ class Hand:
         """
         assert self._held is not None
         now = self.tcp_from(self._held.index)
-        if now.gap(self._held.grasped)[0] > LOST:
-            raise PlanFailed("dropped", f"{self.surroundings.name(self._held.index)} is not in the hand after the lift")
+        if now.distance_to(self._held.grasped)[0] > LOST:
+            raise PlanFailed("dropped", f"{self.world_model.name(self._held.index)} is not in the hand after the lift")
         return now
 
     def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
@@ -124,44 +124,44 @@ class Hand:
     def release(self) -> None:
         """From now on the hand is empty."""
         self._held = None
-        self.surroundings.without(None)
+        self.world_model.exclude(None)
         self._planner.hold(self.empty)
 
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
         """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
-        self.surroundings.allow(contacts)
+        self.world_model.allow(contacts)
 
-    def choose(self, leg: Leg, then: Callable[[int], Leg] | None = None) -> Choice:
+    def choose(self, leg: MotionChoice, then: Callable[[int], MotionChoice] | None = None) -> ChosenMotion:
         """The best goal of a leg from here; see `choice.choose`."""
-        return choose(self.arm, self._planner.settings.plan, self.q, leg, then, self.mover)
+        return choose(self.arm, self._planner.settings.plan, self.q, leg, then, self.motion_method)
 
-    def way_out(self, leg: Leg) -> PosePath | None:
-        """How a leg leaves from here; see `choice.way_out`."""
-        return way_out(self.arm, self._planner.settings.plan, self.q, leg)
+    def departure_path(self, leg: MotionChoice) -> PosePath | None:
+        """How a leg leaves from here; see `choice.departure_path`."""
+        return departure_path(self.arm, self._planner.settings.plan, self.q, leg)
 
-    def go(self, choice: Choice) -> Actions:
+    def go(self, choice: ChosenMotion) -> Actions:
         """Do what was chosen."""
-        *before, (last, loosely) = choice.parts
-        for path, roughly in before:
-            yield from self.follow(path, loosely=roughly)
-        yield from self.follow(last, loosely=loosely, onward=choice.onward, plan=choice.plan)
+        *before, (last, exact) = choice.parts
+        for path, to_its_end in before:
+            yield from self.follow(path, exact=to_its_end)
+        yield from self.follow(last, exact=exact, next_motion=choice.next_motion, plan=choice.plan)
 
     def follow(
         self,
         path: PosePath,
         *,
-        loosely: bool = False,
-        onward: Onward | None = None,
-        strictly: bool = False,
+        exact: bool = True,
+        next_motion: NextMotion | None = None,
+        detours: bool = True,
         plan: Plan | None = None,
     ) -> Actions:
         """Follow a path to its end, round what is in the way.
 
         Args:
             path: of the tcp.
-            loosely: until it is within reach of the end.
-            onward: what comes next: where there is a choice, the path ends in a posture that suits it.
-            strictly: along the path or not at all.
+            exact: False: done as soon as the tool is within reach of the end.
+            next_motion: what comes next: where there is a choice, the path ends in a posture that suits it.
+            detours: False: along the path or not at all.
             plan: what the path comes from; a hand that moves as it has planned follows that.
 
         Raises:
@@ -169,9 +169,9 @@ class Hand:
                 hand is not.
         """
         if plan is not None and plan.how == PATH:
-            self._planner.follow(plan, loosely=loosely)
+            self._planner.follow(plan, exact=exact)
         else:
-            self._planner.go(path, loosely=loosely, onward=onward, strictly=strictly)
+            self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours)
         led = plan if plan is not None and plan.how == ESCAPE else None
         if led:
             nominal = final_path(self.arm.fk(self.q), led.imitated, led.guide)
@@ -187,17 +187,19 @@ class Hand:
                 raise PlanFailed(command.reason, command.detail or self._stall_detail())
             yield self._action(command.velocity)
 
-    def leave(self, path: PosePath, way: float) -> Actions:
-        """Follow a path loosely: strictly until `way` [m] from its beginning, where a detour would push things over.
+    def leave(self, path: PosePath, distance: float) -> Actions:
+        """Follow a path to within reach of its end, without detours up to `distance` [m] from its beginning.
+
+        A detour there would push things over.
 
         Raises:
             PlanFailed: as `follow`.
         """
-        away = np.linalg.norm(path.positions - path.positions[0], axis=1) > way
+        away = np.linalg.norm(path.positions - path.positions[0], axis=1) > distance
         free = int(np.argmax(away)) if away.any() else len(path) - 1
-        yield from self.follow(path[: free + 1], loosely=True, strictly=True)
+        yield from self.follow(path[: free + 1], exact=False, detours=False)
         if free < len(path) - 1:
-            yield from self.follow(path[free:], loosely=True)
+            yield from self.follow(path[free:], exact=False)
 
     def _note_escape(self, command: Command, led: bool) -> None:
         if command.state == ESCAPING or (led and command.state not in (DONE, FAILED)):
@@ -211,9 +213,9 @@ class Hand:
         if self._held is None:
             return
         held, now = self._held, self.tcp_from(self._held.index)
-        if held.grasped.gap(now)[0] > LOST:
-            raise PlanFailed("dropped", f"{self.surroundings.name(held.index)} is not in the hand any more")
-        distance, angle = held.guarded.gap(now)
+        if held.grasped.distance_to(now)[0] > LOST:
+            raise PlanFailed("dropped", f"{self.world_model.name(held.index)} is not in the hand any more")
+        distance, angle = held.guarded.distance_to(now)
         if distance > SLIP or angle > TURN:
             self._held = held._replace(guarded=now)
             self._planner.hold(self.body_with(held.shape, now))
@@ -235,7 +237,7 @@ class Hand:
         return self._action(self._planned().velocity)
 
     def _planned(self) -> Command:
-        self._planner.see(self.surroundings.seen(self.observation), self.surroundings.allowed)
+        self._planner.see(self.world_model.obstacles(self.observation), self.world_model.allowed)
         return self._planner.step(self.q)
 
     def _action(self, speeds: np.ndarray) -> np.ndarray:

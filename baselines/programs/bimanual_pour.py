@@ -22,7 +22,7 @@ from ...planner.imitation.bimanual import shared_translation
 from ...planner.imitation.demonstration import Demonstration
 from ...planner.imitation.segmentation import resampled
 from ..policy import LabeledPath
-from .dual_arm_executor import Paths, RollOut, TwoHands
+from .dual_arm_executor import DualArmExecutor, DualArmRollOut, Paths
 from .pour_goals import Size, lip, lip_direction, standing
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ LEAST = 60
 """Choices that are rolled out before giving up."""
 
 
-class Choice(NamedTuple):
+class PourSwing(NamedTuple):
     """A way to do it.
 
     Attributes:
@@ -66,7 +66,7 @@ class BimanualPourProgram:
     SEGMENTS = ("approach", "carry", "return")
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: TwoHands):
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: DualArmExecutor):
         self.task, self.settings, self.hands = task, settings, hands
         self._sizes = [Size.of(each.size) for each in task.objects]
         self._read(shown)
@@ -101,10 +101,10 @@ class BimanualPourProgram:
         yield from hands.wait(self.settings.drain)
         yield from hands.move(choice.back, SLOW)
 
-    def _chosen(self, held: list[Pose]) -> Choice:
+    def _chosen(self, held: list[Pose]) -> PourSwing:
         """The first choice whose roll-out arrives with room to the joint limits, else the best that arrives."""
-        best: tuple[float, Choice] | None = None
-        failed = RollOut("ik_or_limit", self.hands.q, 0.0)
+        best: tuple[float, PourSwing] | None = None
+        failed = DualArmRollOut("ik_or_limit", self.hands.q, 0.0)
         choices = product(PLACES, POUR_YAWS, HOLDER_YAWS, SIDES)
         for _, (place, pour, holder, side) in zip(range(LEAST), choices, strict=False):
             choice = self._choice(held, np.array(place), pour, pour + side, holder)
@@ -119,7 +119,7 @@ class BimanualPourProgram:
             raise PlanFailed(failed.reason, "no place and direction of pouring was found that both arms can reach")
         return best[1]
 
-    def _choice(self, held: list[Pose], place: np.ndarray, pour: float, pourer: float, holder: float) -> Choice:
+    def _choice(self, held: list[Pose], place: np.ndarray, pour: float, pourer: float, holder: float) -> PourSwing:
         """The paths of both tcps.
 
         Args:
@@ -138,7 +138,7 @@ class BimanualPourProgram:
         hold = _turned(held[TARGET], turn, holder) @ _top(self._sizes[TARGET])
         right, left = (arm.fk(q) for arm, q in zip(self.task.arms, self.hands.q, strict=True))
         now = (left @ hold).inverse() @ right @ tool
-        relative, tail = self.hands.mover.relative(self._carry, now)
+        relative, tail = self.hands.motion_method.relative(self._carry, now)
         rims, _ = shared_translation(relative[len(relative) - tail :], world_from_rim, SHARE)
         blend = _in_equal_steps(left @ hold, rims[0], len(relative) - tail)
         rims = PosePath(np.concatenate([blend.dqs, rims.dqs]))
@@ -146,7 +146,7 @@ class BimanualPourProgram:
         back = self._return.moved(relative[-1] @ self._return[0].inverse())
         still = PosePath(np.repeat(rims.dqs[-1:], len(back), axis=0))
         from_lip, from_rim = tool.inverse(), hold.inverse()
-        return Choice(
+        return PourSwing(
             (lips.with_tool(from_lip), rims.with_tool(from_rim)),
             (_composed(still, back).with_tool(from_lip), still.with_tool(from_rim)),
         )
@@ -157,7 +157,7 @@ def _top(size: Size) -> Pose:
 
 
 def _turned(held: Pose, glass: float, hand: float) -> Pose:
-    """A round glass in the hand, turned so that the hand points along `hand` when the glass's yaw is `glass` [rad]."""
+    """Turn a round glass in the hand so that the hand's yaw is `hand` when the glass's yaw is `glass` [rad]."""
     approach = held.inverse().rotation[:2, 2]
     return held @ Pose.from_yaw([0, 0, 0], float(np.arctan2(approach[1], approach[0])) - (hand - glass))
 

@@ -20,10 +20,10 @@ from ...planner.errors import PlanFailed
 from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
 from ...planner.safety.safety_layer import BLOCKED, SafetyLayer
-from ..motion.motion_method import Mover
+from ..motion.motion_method import MotionMethod
 from ..motion.settings import ProgramSettings
 from ..policy import LabeledPath, Observation
-from .world_model import TABLE, TABLE_MARGIN, intruders_of
+from .world_model import TABLE, TABLE_MARGIN, obstacles_in
 
 CLOSE = 1.0
 WRIST = 3
@@ -33,7 +33,7 @@ NEAR = 0.02
 Paths = tuple[PosePath, PosePath]
 
 
-class RollOut(NamedTuple):
+class DualArmRollOut(NamedTuple):
     """What became of a kinematic run along two paths.
 
     Attributes:
@@ -47,19 +47,26 @@ class RollOut(NamedTuple):
     margin: float
 
 
-class TwoHands:
+class DualArmExecutor:
     """Commanded joints of two arms with what they hold, and the latest observation.
 
     Attributes:
         q: (2, dof) commanded joints.
         observation: the latest; the policy renews it before each tick.
-        drawn: none, see `Hand`.
+        drawn: none, see `ArmExecutor`.
     """
 
     drawn: tuple[LabeledPath, ...] = ()
 
-    def __init__(self, task: TaskDescription, settings: ProgramSettings, observation: Observation, mover: Mover):
-        self.task, self.settings, self._safety, self.mover = task, settings.motion, settings.safety, mover
+    def __init__(
+        self, task: TaskDescription, settings: ProgramSettings, observation: Observation, motion_method: MotionMethod
+    ):
+        self.task, self.settings, self._safety, self.motion_method = (
+            task,
+            settings.motion,
+            settings.safety,
+            motion_method,
+        )
         self._guard = settings.guard
         self.observation, self.arms = observation, task.arms
         self.q = np.array(observation["joint_positions"], dtype=np.float64)
@@ -89,25 +96,25 @@ class TwoHands:
     def move(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
         """Bring both hands along paths, or to their ends by another way if the mover has one; see `follow`."""
         ends = [path[-1] for path in paths]
-        way = self.mover.way_of_two(self.arms, self.q, ends, self._seen, self.settings.dt)
-        if way is None:
+        path = self.motion_method.dual_arm_path(self.arms, self.q, ends, self._seen, self.settings.dt)
+        if path is None:
             return self.follow(paths, radius)
-        if isinstance(way, str):
-            reason = "ik_or_limit" if way == "ik_or_limit" else "blocked"
+        if isinstance(path, str):
+            reason = "ik_or_limit" if path == "ik_or_limit" else "blocked"
             raise PlanFailed(reason, "no way of both arms through joint space was found")
-        return self._follow_joints(way)
+        return self._follow_joints(path)
 
-    def _follow_joints(self, way: np.ndarray) -> Iterator[np.ndarray]:
+    def _follow_joints(self, path: np.ndarray) -> Iterator[np.ndarray]:
         """Along joints (t, 2, dof), as far as the safety layer lets them."""
         index, waited = 0, 0.0
-        while index < len(way):
-            wanted = (way[index] - self.q).ravel() / self.settings.dt
+        while index < len(path):
+            wanted = (path[index] - self.q).ravel() / self.settings.dt
             yield self._action(self._layer(self.q.ravel(), wanted).velocity.reshape(self.q.shape))
             waited += self.settings.dt
-            if np.abs(self.q - way[index]).max() < NEAR:
+            if np.abs(self.q - path[index]).max() < NEAR:
                 index, waited = index + 1, 0.0
             elif waited > self.settings.pursuit.patience:
-                raise PlanFailed("blocked", f"no progress at {index / len(way):.0%} of the way of both hands")
+                raise PlanFailed("blocked", f"no progress at {index / len(path):.0%} of the way of both hands")
 
     def follow(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
         """Follow two paths of the same length; each pose is left when both are within a screw length of it [m].
@@ -117,7 +124,7 @@ class TwoHands:
         """
         index, waited = 0, 0.0
         while index < len(paths[0]):
-            if len(intruders_of(self.observation)):
+            if len(obstacles_in(self.observation)):
                 self._layer = self._renewed_layer()
             speeds, blocked = self._towards(paths, index)
             yield self._action(speeds)
@@ -135,11 +142,11 @@ class TwoHands:
 
     def still(self) -> np.ndarray:
         """The action of standing still, or of retreating from what comes too close."""
-        if len(intruders_of(self.observation)):
+        if len(obstacles_in(self.observation)):
             self._layer = self._renewed_layer()
         return self._action(self._layer(self.q.ravel(), np.zeros(self.q.size)).velocity.reshape(self.q.shape))
 
-    def roll_out(self, paths: Paths, radius: float) -> RollOut:
+    def roll_out(self, paths: Paths, radius: float) -> DualArmRollOut:
         """What would become of following two paths from now on, by kinematics alone; nothing is moved."""
         start, previous = self.q.copy(), self._layer.work[PREVIOUS].copy()
         margin, reason = np.inf, ""
@@ -151,19 +158,22 @@ class TwoHands:
         end, self.q, self._layer.work[PREVIOUS] = self.q, start, previous
         for controller in self._controllers:
             controller.reset()
-        return RollOut(reason, end, margin)
+        return DualArmRollOut(reason, end, margin)
 
     def _towards(self, paths: Paths, index: int) -> tuple[np.ndarray, bool]:
         """Safe speeds (2, dof) towards a pose of each path, and whether something is in the way."""
         each = zip(self._controllers, self.q, paths, strict=True)
         wanted = np.array([controller(q, path[index]) for controller, q, path in each])
         filtered = self._layer(self.q.ravel(), wanted.ravel())
-        near = filtered.room < self._safety.distance
+        near = filtered.slack < self._safety.distance
         return filtered.velocity.reshape(self.q.shape), filtered.status == BLOCKED or near
 
     def _gap(self, paths: Paths, index: int) -> float:
         """The larger screw length [m] of the two hands to a pose of their paths."""
-        gaps = [dq.gap(arm.fk(q).dq, path.dqs[index]) for arm, q, path in zip(self.arms, self.q, paths, strict=True)]
+        gaps = [
+            dq.pose_distance(arm.fk(q).dq, path.dqs[index])
+            for arm, q, path in zip(self.arms, self.q, paths, strict=True)
+        ]
         return max(float(np.hypot(distance, METERS_PER_RADIAN * angle)) for distance, angle in gaps)
 
     def _action(self, speeds: np.ndarray) -> np.ndarray:
@@ -177,7 +187,7 @@ class TwoHands:
         return self._renewed_layer(guard=True).work
 
     def _renewed_layer(self, *, guard: bool = False) -> SafetyLayer:
-        around = (*self._fixed, *intruders_of(self.observation))
+        around = (*self._fixed, *obstacles_in(self.observation))
         allowed = self.task.touching
         pairs = self._pairs
         if not (guard or self._guard):

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...envs.core.description import TaskDescription
 from ...envs.pour.geometry import SOURCE, TARGET
-from ...envs.scene.body_clearance import tool_room
+from ...envs.scene.body_clearance import tool_clearance
 from ...planner.errors import PlanFailed
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Obstacle, pack
@@ -24,9 +24,9 @@ from ...planner.imitation.segmentation import resampled
 from ...planner.imitation.tsia import departure, imitated_path, screw_path
 from ...planner.planning.plan import Plan
 from ...planner.robot.body import Body
-from ..motion.motion_method import DIRECT, MADE, LegPlanner
+from ..motion.motion_method import DIRECT, MADE, MotionPlanner
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, Hand
+from .arm_executor import CLOSE, OFF, ArmExecutor
 from .pour_goals import PourGoals
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ CHANCES = 3
 Contacts = tuple[tuple[str, str], ...]
 
 
-class Way(NamedTuple):
+class CarryCandidate(NamedTuple):
     """Motions as planned, one after the other.
 
     Attributes:
@@ -68,11 +68,11 @@ class Way(NamedTuple):
     rank: int
     reason: str = ""
 
-    def then(self, other: Way) -> Way:
+    def then(self, other: CarryCandidate) -> CarryCandidate:
         """Both, one after the other."""
         margin, rank = min(self.margin, other.margin), min(self.rank, other.rank)
         paths, plans = (*self.paths, *other.paths), (*self.plans, *other.plans)
-        return Way(paths, plans, other.q, margin, rank, self.reason or other.reason)
+        return CarryCandidate(paths, plans, other.q, margin, rank, self.reason or other.reason)
 
     @property
     def order(self) -> tuple[int, bool, float]:
@@ -86,12 +86,12 @@ class PourProgram:
     SEGMENTS = ("carry",)
     """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
-        self.task, self.settings, self.hand = task, settings, hand
-        hand.slow_down(PACE)
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
+        self.task, self.settings, self.executor = task, settings, executor
+        executor.slow_down(PACE)
         self.shown = {s.name: resampled(shown.segment_path(s.name), settings.resample) for s in shown.segments}
-        self.in_hand = bool(hand.observation["motion_index"][0] >= 1.0)
-        self.goals = PourGoals(task, shown, hand.tcp_from(SOURCE) if self.in_hand else None)
+        self.in_hand = bool(executor.observation["motion_index"][0] >= 1.0)
+        self.goals = PourGoals(task, shown, executor.tcp_from(SOURCE) if self.in_hand else None)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.shown.items()]
         self.source, self.target = (each.name for each in task.objects)
         self._plan = settings.reactive.plan
@@ -103,37 +103,37 @@ class PourProgram:
 
     def actions(self) -> Iterator[np.ndarray]:
         """Fetch the source if it is not in the hand, lift it, pour, and turn it upright again."""
-        hand = self.hand
+        executor = self.executor
         if self.in_hand:
-            yield from hand.grip(CLOSE, self.settings.close)
+            yield from executor.grip(CLOSE, self.settings.close)
         else:
             yield from self._fetch()
-        grasped, shape = hand.tcp_from(SOURCE), self.task.objects[SOURCE].shape
-        hand.hold(SOURCE, shape, grasped)
+        grasped, shape = executor.tcp_from(SOURCE), self.task.objects[SOURCE].shape
+        executor.hold(SOURCE, shape, grasped)
         if self._stands():
-            hand.allow(self._standing)
-            yield from hand.leave(self._lift(hand.arm.fk(hand.q)), OFF)
+            executor.allow(self._standing)
+            yield from executor.leave(self._lift(executor.arm.fk(executor.q)), OFF)
         # the source slips a little while it is lifted: the goal is computed from how it is held now
-        held = hand.lifted()
-        hand.hold(SOURCE, shape, held)
+        held = executor.lifted()
+        executor.hold(SOURCE, shape, held)
         yield from self._carry(held)
-        yield from hand.wait(self.settings.drain)
+        yield from executor.wait(self.settings.drain)
         yield from self._return()
 
     def _stands(self) -> bool:
         """Whether the source is on its stand, from which it must be lifted."""
-        bottom = self.hand.object_pose(SOURCE).position - [0.0, 0.0, 0.5 * self.task.objects[SOURCE].size[2]]
-        return float(np.linalg.norm(bottom - self.hand.observation["furniture_pose"][SOURCE, :3])) < OFF
+        bottom = self.executor.object_pose(SOURCE).position - [0.0, 0.0, 0.5 * self.task.objects[SOURCE].size[2]]
+        return float(np.linalg.norm(bottom - self.executor.observation["furniture_pose"][SOURCE, :3])) < OFF
 
     def _fetch(self) -> Iterator[np.ndarray]:
-        way = self._chosen_fetch()
-        before, after, *_ = way.paths
+        candidate = self._chosen_fetch()
+        before, after, *_ = candidate.paths
         self.paths.append(LabeledPath("final", f"fetch {self.source}", before.joined(after)))
-        yield from self.hand.follow(before, loosely=True, plan=way.plans[0])
-        self.hand.allow(self._wanted[SOURCE])
-        yield from self.hand.follow(after, plan=way.plans[1])
-        yield from self.hand.wait(self.settings.settle)
-        yield from self.hand.grip(CLOSE, self.settings.close)
+        yield from self.executor.follow(before, exact=False, plan=candidate.plans[0])
+        self.executor.allow(self._wanted[SOURCE])
+        yield from self.executor.follow(after, plan=candidate.plans[1])
+        yield from self.executor.wait(self.settings.settle)
+        yield from self.executor.grip(CLOSE, self.settings.close)
 
     def _lift(self, start: Pose) -> PosePath:
         """As shown, from where the hand is; straight up if it is not shown."""
@@ -146,15 +146,15 @@ class PourProgram:
         """Carry, then tilt; another way is looked for where one turns out to be blocked."""
         failed: list[float] = []
         while True:
-            way, turn = self._chosen_carry(self.hand.q, held, failed, thoroughly=True)
-            carry, tilt = way.paths
+            candidate, turn = self._chosen_carry(self.executor.q, held, failed, thoroughly=True)
+            carry, tilt = candidate.paths
             self.paths.append(LabeledPath("final", "carry and pour", carry.joined(tilt)))
-            self.hand.allow(())
+            self.executor.allow(())
             try:
-                yield from self.hand.follow(carry, loosely=True, plan=way.plans[0])
+                yield from self.executor.follow(carry, exact=False, plan=candidate.plans[0])
                 # near the target, the source may come as near to it as was shown
-                self.hand.allow(self._wanted[TARGET])
-                yield from self.hand.follow(tilt, plan=way.plans[1])
+                self.executor.allow(self._wanted[TARGET])
+                yield from self.executor.follow(tilt, plan=candidate.plans[1])
                 return
             except PlanFailed:
                 failed.append(turn)
@@ -165,50 +165,52 @@ class PourProgram:
         """Upright again, as shown if it is shown."""
         if "return" in self.shown:
             back = self.shown["return"]
-            here = self.hand.arm.fk(self.hand.q)
-            yield from self.hand.follow(imitated_path(back, here @ back[0].inverse() @ back[-1]), loosely=True)
+            here = self.executor.arm.fk(self.executor.q)
+            yield from self.executor.follow(imitated_path(back, here @ back[0].inverse() @ back[-1]), exact=False)
 
     def _body(self, held: Pose) -> Body:
-        return self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.hand.arm)
+        return self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.executor.arm)
 
-    def _around(self, body: Body) -> list[Obstacle]:
+    def _named_obstacles(self, body: Body) -> list[Obstacle]:
         """What stands around an arm; what moves is left to the moment."""
-        seen = self.hand.surroundings.seen(self.hand.observation)
+        seen = self.executor.world_model.obstacles(self.executor.observation)
         still = [each for each in seen if not np.any(each.velocity)]
         return [each for each in still if not (body.held and each.name == self.source)]
 
     def _near(self, index: int, path: PosePath, body: Body) -> int:
         """Index of the pose from which on the hand, or what it holds, stays near a glass."""
-        glass = pack([Obstacle(self.task.objects[index].shape, self.hand.object_pose(index))])
-        tool = body.tool(self.hand.arm)
-        rooms = np.array([tool_room(tool, row[None], glass) for row in path.dqs])
+        glass = pack([Obstacle(self.task.objects[index].shape, self.executor.object_pose(index))])
+        tool = body.tool(self.executor.arm)
+        rooms = np.array([tool_clearance(tool, row[None], glass) for row in path.dqs])
         far = np.flatnonzero(rooms > NEAR)
         return max(1, int(far[-1])) if len(far) else 1
 
-    def _planned(self, planner: LegPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> Way:
+    def _planned(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> CarryCandidate:
         """A motion to the end of a path, round what is around."""
         contacts = (*self.task.touching, *allowed)
-        plan = planner.plan(path, q, path[-1], self._around(planner.body), allowed=contacts)
+        plan = planner.plan(path, q, path[-1], self._named_obstacles(planner.body), allowed=contacts)
         followed = path if plan.how == "joint search" or not plan.success else plan.path
-        as_shown = plan.how == DIRECT or (plan.how in MADE and plan.kept == 1.0)
+        as_shown = plan.how == DIRECT or (plan.how in MADE and plan.imitated_share == 1.0)
         rank = 0 if not plan.success else 2 if as_shown else 1
         reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"
-        return Way((followed,), (plan,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason)
+        return CarryCandidate(
+            (followed,), (plan,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason
+        )
 
-    def _chosen_fetch(self) -> Way:
+    def _chosen_fetch(self) -> CarryCandidate:
         """The grasp, and with it the pouring, that is nearest to what was shown and can be done."""
-        hand, best, held = self.hand, None, self.goals.held
-        empty = hand.mover.planner(hand.arm, self.task.bodies[0], self._plan)
-        full = hand.mover.planner(hand.arm, self._body(held), replace(self._plan, search=None))
+        executor, best, held = self.executor, None, self.goals.held
+        empty = executor.motion_method.planner(executor.arm, self.task.bodies[0], self._plan)
+        full = executor.motion_method.planner(executor.arm, self._body(held), replace(self._plan, search=None))
         for turn in TURNS:
-            goal = self.goals.grasp(hand.object_pose(SOURCE), turn)
-            way = self._in_two(empty, imitated_path(self.shown["approach"], goal), hand.q, SOURCE)
-            if way.rank:
-                way = way.then(self._planned(full, self._lift(goal), way.q, self._standing))
-            if way.rank:
-                way = way.then(self._chosen_carry(way.q, held, [], thoroughly=False)[0])
-            if best is None or (len(way.paths), way.order) > (len(best.paths), best.order):
-                best = way
+            goal = self.goals.grasp(executor.object_pose(SOURCE), turn)
+            candidate = self._in_two(empty, imitated_path(self.shown["approach"], goal), executor.q, SOURCE)
+            if candidate.rank:
+                candidate = candidate.then(self._planned(full, self._lift(goal), candidate.q, self._standing))
+            if candidate.rank:
+                candidate = candidate.then(self._chosen_carry(candidate.q, held, [], thoroughly=False)[0])
+            if best is None or (len(candidate.paths), candidate.order) > (len(best.paths), best.order):
+                best = candidate
             if best.rank and best.margin >= MARGIN:
                 break
         assert best is not None
@@ -216,7 +218,9 @@ class PourProgram:
             raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
         return best
 
-    def _chosen_carry(self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool) -> tuple[Way, float]:
+    def _chosen_carry(
+        self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool
+    ) -> tuple[CarryCandidate, float]:
         """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
 
         Args:
@@ -226,7 +230,7 @@ class PourProgram:
             thoroughly: also look for ways through joint space.
         """
         body = self._body(held)
-        quick = self.hand.mover.planner(self.hand.arm, body, replace(self._plan, search=None))
+        quick = self.executor.motion_method.planner(self.executor.arm, body, replace(self._plan, search=None))
         tries = []
         for turn in TURNS:
             if turn not in failed:
@@ -235,21 +239,21 @@ class PourProgram:
                     return tries[-1]
         best = max(tries, key=lambda each: each[0].order)
         if best[0].rank == 0 and thoroughly:
-            thorough = self.hand.mover.planner(self.hand.arm, body, self._plan)
+            thorough = self.executor.motion_method.planner(self.executor.arm, body, self._plan)
             tries = [(self._carried(thorough, q, held, turn), turn) for _, turn in tries[:CHANCES]]
             best = max(tries, key=lambda each: each[0].order)
         return best
 
-    def _carried(self, planner: LegPlanner, q: np.ndarray, held: Pose, turn: float) -> Way:
+    def _carried(self, planner: MotionPlanner, q: np.ndarray, held: Pose, turn: float) -> CarryCandidate:
         """The carry and the tilting of one turn."""
-        goal = self.goals.pouring(self.hand.object_pose(TARGET), held, turn)
+        goal = self.goals.pouring(self.executor.object_pose(TARGET), held, turn)
         return self._in_two(planner, imitated_path(self.shown["carry"], goal), q, TARGET)
 
-    def _in_two(self, planner: LegPlanner, path: PosePath, q: np.ndarray, glass: int) -> Way:
+    def _in_two(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, glass: int) -> CarryCandidate:
         """A path that ends near a glass, which may be touched only by what comes near it on purpose."""
         split = self._near(glass, path, planner.body)
         before, after = path[: split + 1], path[split:]
-        way = self._planned(planner, before, q, ())
-        if way.rank == 0:
-            return way._replace(paths=(before, after), plans=(None, None))
-        return way.then(self._planned(planner, after, way.q, self._wanted[glass]))
+        candidate = self._planned(planner, before, q, ())
+        if candidate.rank == 0:
+            return candidate._replace(paths=(before, after), plans=(None, None))
+        return candidate.then(self._planned(planner, after, candidate.q, self._wanted[glass]))

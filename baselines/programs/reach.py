@@ -12,8 +12,8 @@ from ...planner.geometry.pose import Pose
 from ...planner.imitation.demonstration import Demonstration
 from ...planner.imitation.segmentation import resampled
 from ..policy import LabeledPath
-from .arm_executor import Hand
-from .goal_choice import Leg
+from .arm_executor import ArmExecutor
+from .goal_choice import MotionChoice
 
 if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings
@@ -25,16 +25,16 @@ class ReachProgram:
     SEGMENTS = ("approach",)
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
-        self.task, self.settings, self.hand = task, settings, hand
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
+        self.task, self.settings, self.executor = task, settings, executor
         self.approach = resampled(shown.segment_path("approach"), settings.resample)
         self.paths = [LabeledPath("demonstrated", "approach", self.approach)]
 
     def actions(self) -> Iterator[np.ndarray]:
         """Go there; half a turn of the hand makes no difference."""
-        hand, target = self.hand, self.task.objects[0].name
-        goals = tuple(hand.goal_pose(0) @ Pose.from_yaw([0.0, 0.0, 0.0], turn) for turn in (0.0, np.pi))
-        around = hand.surroundings.around(hand.observation, None)
-        choice = hand.choose(Leg(target, self.approach, goals, hand.empty, around, self.task.touching))
+        executor, target = self.executor, self.task.objects[0].name
+        goals = tuple(executor.goal_pose(0) @ Pose.from_yaw([0.0, 0.0, 0.0], turn) for turn in (0.0, np.pi))
+        around = executor.world_model.obstacles_if_holding(executor.observation, None)
+        choice = executor.choose(MotionChoice(target, self.approach, goals, executor.empty, around, self.task.touching))
         self.paths.append(LabeledPath("final", f"reach {target}", choice.path))
-        yield from hand.go(choice)
+        yield from executor.go(choice)

@@ -20,8 +20,8 @@ from ...planner.imitation.demonstration import Demonstration
 from ...planner.imitation.segmentation import resampled
 from ...planner.imitation.tsia import imitated_path, screw_path
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, OPEN, Hand
-from .goal_choice import Choice, Leg
+from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor
+from .goal_choice import ChosenMotion, MotionChoice
 from .world_model import FREE_MARGIN, OBJECT_MARGIN
 
 if TYPE_CHECKING:
@@ -44,20 +44,20 @@ class ShelveProgram:
     SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
-        self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
+        self.task, self.shown, self.settings, self.executor = task, shown, settings, executor
         self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
         self._release = _gripper_after(shown, "insert", task)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 
     def actions(self) -> Iterator[np.ndarray]:
         """Fetch and shelve each book in order, then withdraw; a first one may be in the hand already."""
-        in_hand = self.hand.observation["motion_index"][0] == 1.0
-        for k in range(len(self.hand.observation["goal_pose"])):
+        in_hand = self.executor.observation["motion_index"][0] == 1.0
+        for k in range(len(self.executor.observation["goal_pose"])):
             if in_hand and k == 0:
-                yield from self.hand.grip(CLOSE, self.settings.close)
-                self.hand.slow_down(PACE)
-                self.hand.hold(k, self.task.objects[k].shape, self.hand.tcp_from(k))
+                yield from self.executor.grip(CLOSE, self.settings.close)
+                self.executor.slow_down(PACE)
+                self.executor.hold(k, self.task.objects[k].shape, self.executor.tcp_from(k))
             else:
                 yield from self._awaited(k)
                 yield from self._fetch(k)
@@ -67,8 +67,8 @@ class ShelveProgram:
 
     def _awaited(self, k: int) -> Iterator[np.ndarray]:
         """Open the hand, and rise out of the way until book k lies on the stand: nobody reaches under an arm."""
-        yield from self.hand.grip(OPEN, self.settings.open)
-        out_of_the_way = () if self._on_stand(k) else self.hand.follow(self._rise(), loosely=True)
+        yield from self.executor.grip(OPEN, self.settings.open)
+        out_of_the_way = () if self._on_stand(k) else self.executor.follow(self._rise(), exact=False)
         for action in out_of_the_way:
             yield action
             if self._on_stand(k):
@@ -78,84 +78,87 @@ class ShelveProgram:
             if left == 0:
                 raise PlanFailed("timeout", f"{self.task.objects[k].name} was not handed over")
             left -= 1
-            yield self.hand.still()
+            yield self.executor.still()
 
     def _rise(self) -> PosePath:
         """Straight up from here by as much as the demonstrated lift: the hand is turned otherwise than there."""
-        here, lift = self.hand.arm.fk(self.hand.q), self._parts["lift"]
+        here, lift = self.executor.arm.fk(self.executor.q), self._parts["lift"]
         height = lift[-1].position[2] - lift[0].position[2]
         up = Pose.from_position_quaternion([0.0, 0.0, height])
         return screw_path(here, up @ here, self.settings.resample)
 
     def _on_stand(self, k: int) -> bool:
         names = [each.name for each in self.task.furniture]
-        return self.hand.object_pose(k).position[2] > self.hand.observation["furniture_pose"][names.index(STAND), 2]
+        return (
+            self.executor.object_pose(k).position[2]
+            > self.executor.observation["furniture_pose"][names.index(STAND), 2]
+        )
 
     def _fetch(self, k: int) -> Iterator[np.ndarray]:
         reach = self._parts["reach"]
         grasp = self.shown.segment("reach").reference_pose.inverse() @ reach[-1]
-        goal = self.hand.object_pose(k) @ grasp
-        touching = (*_around((self.task.objects[k].name,)), ("fingers", STAND))
+        goal = self.executor.object_pose(k) @ grasp
+        touching = (*_named_obstacles((self.task.objects[k].name,)), ("fingers", STAND))
         leg = self._leg("approach", k, imitated_path(reach, goal)[0])
-        choice = self.hand.choose(leg, lambda _: self._leg("reach", k, goal, touching))
+        choice = self.executor.choose(leg, lambda _: self._leg("reach", k, goal, touching))
         yield from self._done(choice, leg)
-        self.hand.allow(touching)
-        yield from self.hand.follow(imitated_path(reach, goal))
-        yield from self.hand.wait(self.settings.settle)
-        yield from self.hand.grip(CLOSE, self.settings.close)
+        self.executor.allow(touching)
+        yield from self.executor.follow(imitated_path(reach, goal))
+        yield from self.executor.wait(self.settings.settle)
+        yield from self.executor.grip(CLOSE, self.settings.close)
 
     def _lift(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
-        grasped = self.hand.tcp_from(k)
-        self.hand.slow_down(PACE)
-        self.hand.hold(k, target.shape, grasped)
-        self.hand.allow((("held", STAND), ("fingers", STAND)))
+        grasped = self.executor.tcp_from(k)
+        self.executor.slow_down(PACE)
+        self.executor.hold(k, target.shape, grasped)
+        self.executor.allow((("held", STAND), ("fingers", STAND)))
         lift = self._from_here("lift")
         off = int(np.argmax(lift.positions[:, 2] > lift[0].position[2] + OFF))
-        yield from self.hand.follow(lift[: off + 1], loosely=True, strictly=True)
-        self.hand.allow(())
-        yield from self.hand.follow(lift[off:], loosely=True)
-        self.hand.lifted()
+        yield from self.executor.follow(lift[: off + 1], exact=False, detours=False)
+        self.executor.allow(())
+        yield from self.executor.follow(lift[off:], exact=False)
+        self.executor.lifted()
 
     def _shelve(self, k: int) -> Iterator[np.ndarray]:
         names = [each.name for each in self.task.objects]
-        touching = (("held", CUPBOARD), *_around(names[:k] + names[k + 1 :]))
+        touching = (("held", CUPBOARD), *_named_obstacles(names[:k] + names[k + 1 :]))
         for chance in range(CHANCES):
             # the book slips a little while it is lifted: the goal is computed from how it is held now
-            held = self.hand.tcp_from(k)
+            held = self.executor.tcp_from(k)
             insertion = self._insertion(k, held)
-            into = self._leg("insert", k, insertion[-1], touching, held)._replace(demonstrated=insertion, strictly=True)
+            into = self._leg("insert", k, insertion[-1], touching, held)._replace(demonstrated=insertion, detours=False)
             leg, choice = self._chosen_carry(k, insertion[0], held, into)
             yield from self._done(choice, leg)
-            self.hand.surroundings.keep(OBJECT_MARGIN)
-            self.hand.allow(touching)
-            insertion = self._insertion(k, self.hand.tcp_from(k))
+            self.executor.world_model.set_margin(OBJECT_MARGIN)
+            self.executor.allow(touching)
+            insertion = self._insertion(k, self.executor.tcp_from(k))
             try:
-                yield from self.hand.follow(insertion, strictly=True)
+                yield from self.executor.follow(insertion, detours=False)
                 break
             except PlanFailed as failed:
                 if chance + 1 == CHANCES or failed.reason == "dropped":
                     raise
             yield from self._backed_out(insertion)
-        yield from self.hand.wait(self.settings.settle)
-        yield from self.hand.grip(self._release, self.settings.open)
-        self.hand.release()
-        self.hand.allow(_around(names))
+        yield from self.executor.wait(self.settings.settle)
+        yield from self.executor.grip(self._release, self.settings.open)
+        self.executor.release()
+        self.executor.allow(_named_obstacles(names))
 
     def _backed_out(self, insertion: PosePath) -> Iterator[np.ndarray]:
         """Out again, to where an insertion has begun."""
-        here = nearest(insertion, self.hand.arm.fk(self.hand.q))
+        here = nearest(insertion, self.executor.arm.fk(self.executor.q))
         if here:
-            yield from self.hand.follow(insertion[: here + 1].reversed(), loosely=True, strictly=True)
+            yield from self.executor.follow(insertion[: here + 1].reversed(), exact=False, detours=False)
 
-    def _chosen_carry(self, k: int, goal: Pose, held: Pose, into: Leg) -> tuple[Leg, Choice]:
+    def _chosen_carry(self, k: int, goal: Pose, held: Pose, into: MotionChoice) -> tuple[MotionChoice, ChosenMotion]:
         """To before the slot, well clear of everything; with little room where there is no other way."""
         failure = PlanFailed("ik_or_limit", f"no posture is found from which {into.name} can go straight")
         for margin in (FREE_MARGIN, OBJECT_MARGIN):
-            self.hand.surroundings.keep(margin)
+            self.executor.world_model.set_margin(margin)
             leg = self._leg("carry", k, goal, held=held)
             try:
-                choice = self.hand.choose(leg, lambda _: into)
+                choice = self.executor.choose(leg, lambda _: into)
             except PlanFailed as failed:
                 failure = failed
             else:
@@ -167,10 +170,10 @@ class ShelveProgram:
         """Straight back: from between the books first, where a detour would push them over."""
         path = self._from_here("retreat")
         free = int(np.argmax(np.linalg.norm(path.positions - path.positions[0], axis=1) > BETWEEN))
-        yield from self.hand.follow(path[: free + 1], loosely=True, strictly=True)
-        self.hand.slow_down(1.0)
-        self.hand.allow(())
-        yield from self.hand.follow(path[free:], loosely=True)
+        yield from self.executor.follow(path[: free + 1], exact=False, detours=False)
+        self.executor.slow_down(1.0)
+        self.executor.allow(())
+        yield from self.executor.follow(path[free:], exact=False)
 
     def _insertion(self, k: int, held: Pose) -> PosePath:
         """The demonstrated insertion, to where the hand lets go so that the book is in its slot.
@@ -178,32 +181,32 @@ class ShelveProgram:
         It stays as level as it was shown: a book that hangs a little in the hand turns the hand, not the way.
         """
         above, shown = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height]), self._parts["insert"]
-        end = above @ self.hand.goal_pose(k) @ held.inverse()
+        end = above @ self.executor.goal_pose(k) @ held.inverse()
         turn = Pose.from_yaw([0.0, 0.0, 0.0], (end @ shown[-1].inverse()).yaw)
         level = Pose.from_position_quaternion(end.position - (turn @ shown[-1]).position) @ turn
         return shown.moved(level).with_tool((level @ shown[-1]).inverse() @ end)
 
     def _from_here(self, name: str) -> PosePath:
         path = self._parts[name]
-        return path.moved(self.hand.arm.fk(self.hand.q) @ path[0].inverse())
+        return path.moved(self.executor.arm.fk(self.executor.q) @ path[0].inverse())
 
-    def _done(self, choice: Choice, leg: Leg) -> Iterator[np.ndarray]:
+    def _done(self, choice: ChosenMotion, leg: MotionChoice) -> Iterator[np.ndarray]:
         self.paths.append(LabeledPath("final", leg.name, choice.path))
-        self.hand.allow(())
-        yield from self.hand.go(choice)
+        self.executor.allow(())
+        yield from self.executor.go(choice)
 
     def _leg(
         self, name: str, k: int, goal: Pose, allowed: tuple[tuple[str, str], ...] = (), held: Pose | None = None
-    ) -> Leg:
+    ) -> MotionChoice:
         """A motion with book k, which is in the hand where `held` (`tcp_from_object`) is given."""
-        hand, target = self.hand, self.task.objects[k]
-        body = hand.empty if held is None else hand.body_with(target.shape, held)
-        around = hand.surroundings.around(hand.observation, None if held is None else k)
+        executor, target = self.executor, self.task.objects[k]
+        body = executor.empty if held is None else executor.body_with(target.shape, held)
+        around = executor.world_model.obstacles_if_holding(executor.observation, None if held is None else k)
         contacts = (*self.task.touching, *allowed)
-        return Leg(f"{name} {target.name}", self._parts[name], (goal,), body, around, contacts)
+        return MotionChoice(f"{name} {target.name}", self._parts[name], (goal,), body, around, contacts)
 
 
-def _around(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+def _named_obstacles(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Contacts of hand and books while a book is taken or let go: the hand's capsules contain more than the hand."""
     return tuple((part, name) for part in ("fingers", "hand") for name in names)
 

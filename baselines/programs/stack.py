@@ -17,8 +17,8 @@ from ...planner.imitation.demonstration import Demonstration
 from ...planner.imitation.segmentation import resampled, trimmed
 from ...planner.imitation.tsia import departure
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, OPEN, Hand
-from .goal_choice import Choice, Leg
+from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor
+from .goal_choice import ChosenMotion, MotionChoice
 from .world_model import TABLE
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ class StackProgram:
     SEGMENTS = ("approach", "transfer")
     """What a demonstration of this task must have."""
 
-    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hand: Hand):
-        self.task, self.shown, self.settings, self.hand = task, shown, settings, hand
+    def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
+        self.task, self.shown, self.settings, self.executor = task, shown, settings, executor
         step = settings.resample
         self.approach = resampled(shown.segment_path("approach"), step)
         self.transfer = resampled(trimmed(shown.segment_path("transfer"), settings.trim), step)
@@ -64,18 +64,18 @@ class StackProgram:
 
     def actions(self) -> Iterator[np.ndarray]:
         """Fetch and place each object in order, then withdraw; what is placed or in the hand already is left so."""
-        first, in_hand = divmod(int(self.hand.observation["motion_index"][0]), 2)
+        first, in_hand = divmod(int(self.executor.observation["motion_index"][0]), 2)
         for k in range(first, len(self.task.objects)):
             if in_hand and k == first:
-                self.hand.allow(self._wanted(k))
-                yield from self.hand.grip(CLOSE, self.settings.close)
+                self.executor.allow(self._wanted(k))
+                yield from self.executor.grip(CLOSE, self.settings.close)
             else:
                 yield from self._fetch(k)
             yield from self._place(k)
         last = len(self.task.objects) - 1
-        away = self.hand.way_out(self._leg(last, self.approach, (), leaving=self.withdrawal))
+        away = self.executor.departure_path(self._leg(last, self.approach, (), leaving=self.withdrawal))
         if away is not None:
-            yield from self.hand.follow(away, loosely=True)
+            yield from self.executor.follow(away, exact=False)
 
     def _wanted(self, k: int) -> tuple[tuple[str, str], ...]:
         """Contacts that belong to moving object k: of fingers with it and with what it stands on, of it with that."""
@@ -85,49 +85,49 @@ class StackProgram:
         return (*own, *(("held", name) for name in under))
 
     def _fetch(self, k: int) -> Iterator[np.ndarray]:
-        self.hand.allow(self._wanted(k))
+        self.executor.allow(self._wanted(k))
         choice = self._chosen_fetch(k)
         self.paths.append(LabeledPath("final", f"fetch {self.task.objects[k].name}", choice.path))
-        yield from self.hand.go(choice)
-        yield from self.hand.wait(self.settings.settle)
-        yield from self.hand.grip(CLOSE, self.settings.close)
+        yield from self.executor.go(choice)
+        yield from self.executor.wait(self.settings.settle)
+        yield from self.executor.grip(CLOSE, self.settings.close)
 
     def _place(self, k: int) -> Iterator[np.ndarray]:
         target = self.task.objects[k]
-        grasped = self.hand.tcp_from(k)
-        self.hand.hold(k, target.shape, grasped)
+        grasped = self.executor.tcp_from(k)
+        self.executor.hold(k, target.shape, grasped)
         lift = self._lift(k, grasped)
         if lift is not None:
-            yield from self.hand.leave(lift, OFF)
+            yield from self.executor.leave(lift, OFF)
         # the object slips a little while it is lifted: the goal is computed from how it is held now
-        held = self.hand.lifted()
-        choice = self.hand.choose(self._placement(k, held))
+        held = self.executor.lifted()
+        choice = self.executor.choose(self._placement(k, held))
         path = choice.path if lift is None else lift.joined(choice.path)
         self.paths.append(LabeledPath("final", f"place {target.name}", path))
-        yield from self.hand.go(choice)
-        yield from self.hand.wait(self.settings.settle)
-        yield from self.hand.grip(OPEN, self.settings.open)
-        self.hand.release()
+        yield from self.executor.go(choice)
+        yield from self.executor.wait(self.settings.settle)
+        yield from self.executor.grip(OPEN, self.settings.open)
+        self.executor.release()
 
     def _lift(self, k: int, grasped: Pose) -> PosePath | None:
         """Off what the object stands on, as shown; None where it is in the air already."""
-        pose, half = self.hand.object_pose(k), 0.5 * float(self.task.objects[k].size[2])
+        pose, half = self.executor.object_pose(k), 0.5 * float(self.task.objects[k].size[2])
         if pose.position[2] - half > self.task.table_height + OFF:
             return None
-        return self.hand.way_out(self._placement(k, grasped, leaving=self.transfer))
+        return self.executor.departure_path(self._placement(k, grasped, leaving=self.transfer))
 
-    def _chosen_fetch(self, k: int) -> Choice:
+    def _chosen_fetch(self, k: int) -> ChosenMotion:
         """The grasp from which the object can also be placed."""
-        target, hand = self.task.objects[k], self.hand
+        target, executor = self.task.objects[k], self.executor
         ways = grasps(self.shown, target)
-        goals = tuple(hand.object_pose(k) @ grasp for grasp in ways)
+        goals = tuple(executor.object_pose(k) @ grasp for grasp in ways)
         leg = self._leg(k, self.approach, goals, leaving=self.withdrawal if k else None)
-        return hand.choose(leg, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
+        return executor.choose(leg, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
 
-    def _placement(self, k: int, held: Pose, leaving: PosePath | None = None) -> Leg:
+    def _placement(self, k: int, held: Pose, leaving: PosePath | None = None) -> MotionChoice:
         """Object k from the hand to its goal."""
         target = self.task.objects[k]
-        goals = releases(target, self.hand.goal_pose(k), held, self.settings.release_height)
+        goals = releases(target, self.executor.goal_pose(k), held, self.settings.release_height)
         return self._leg(k, self.transfer, tuple(goals), held=held, leaving=leaving, done=self._lifted)
 
     def _leg(
@@ -139,14 +139,14 @@ class StackProgram:
         held: Pose | None = None,
         leaving: PosePath | None = None,
         done: int = 0,
-    ) -> Leg:
-        hand, target = self.hand, self.task.objects[k]
-        body = hand.empty if held is None else hand.body_with(target.shape, held)
-        around = hand.surroundings.around(hand.observation, None if held is None else k)
+    ) -> MotionChoice:
+        executor, target = self.executor, self.task.objects[k]
+        body = executor.empty if held is None else executor.body_with(target.shape, held)
+        around = executor.world_model.obstacles_if_holding(executor.observation, None if held is None else k)
         wanted = [
             pair
             for pair in (*self.task.touching, *self._wanted(k))
             if pair[1] in [obstacle.name for obstacle in around]
         ]
         allowed = tuple(pair for pair in wanted if pair[0] in body.names)
-        return Leg(target.name, demonstrated, goals, body, around, allowed, leaving, done=done)
+        return MotionChoice(target.name, demonstrated, goals, body, around, allowed, leaving, done=done)

@@ -15,14 +15,14 @@ from ..policy import Observation
 TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Distances [m] to keep from what the task itself brings close: things are put down there."""
-INTRUDERS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
+MAX_OBSTACLES = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
 FREE_MARGIN = 0.010
 """Distance [m] to keep where nothing has to be near: a moving arm lags some millimetres behind what guards it."""
 MOVED = 1e-3
 """Change of a pose vector's entry from which an object is in another place."""
 
 
-class Surroundings:
+class WorldModel:
     """The obstacles of one arm, renewed only when something has moved.
 
     Args:
@@ -51,34 +51,34 @@ class Surroundings:
         """Of an object."""
         return self._task.objects[index].name
 
-    def keep(self, margin: float) -> None:
+    def set_margin(self, margin: float) -> None:
         """The distance [m] to keep from objects and furniture from now on."""
         self._margin = margin
         self._poses[:] = np.inf
 
-    def without(self, index: int | None) -> None:
+    def exclude(self, index: int | None) -> None:
         """From now on an object is in the hand, or none is."""
         self._held = index
         self._poses[:] = np.inf
 
-    def seen(self, observation: Observation) -> tuple[Obstacle, ...]:
+    def obstacles(self, observation: Observation) -> tuple[Obstacle, ...]:
         """The obstacles as observed; the same tuple while nothing has moved."""
         poses = self._places(observation)
         moved = np.abs(poses - self._poses).max(axis=1) > MOVED
         if self._held is not None:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
-        intruders = np.column_stack([observation[key].reshape(len(self._intruders), -1) for key in INTRUDERS])
+        intruders = np.column_stack([observation[key].reshape(len(self._intruders), -1) for key in MAX_OBSTACLES])
         if moved.any():
             self._poses[:] = poses
             self._things = self._standing(poses, self._held)
         if moved.any() or (intruders != self._intruders).any():
             self._intruders = intruders
-            self._seen = (*self._things, *intruders_of(observation))
+            self._seen = (*self._things, *obstacles_in(observation))
         return self._seen
 
-    def around(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
+    def obstacles_if_holding(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
         """The obstacles as observed, if an object were in the hand."""
-        return (*self._standing(self._places(observation), held), *intruders_of(observation))
+        return (*self._standing(self._places(observation), held), *obstacles_in(observation))
 
     def _places(self, observation: Observation) -> np.ndarray:
         """Poses (n, 7) of all objects and furniture."""
@@ -88,17 +88,17 @@ class Surroundings:
 
     def _standing(self, poses: np.ndarray, held: int | None) -> tuple[Obstacle, ...]:
         objects, furniture, margin = self._task.objects, self._task.furniture, self._margin
-        around = [
+        obstacles_if_holding = [
             Obstacle(each.shape, Pose.from_vector(pose), name=each.name, margin=margin)
             for k, (each, pose) in enumerate(zip(objects, poses, strict=False))
             if k != held
         ]
         for each, pose in zip(furniture, poses[len(objects) :], strict=True):
-            around += [replace(part, margin=margin) for part in each.at(Pose.from_vector(pose))]
-        return (*self._fixed, *around)
+            obstacles_if_holding += [replace(part, margin=margin) for part in each.at(Pose.from_vector(pose))]
+        return (*self._fixed, *obstacles_if_holding)
 
 
-def intruders_of(observation: Observation) -> tuple[Obstacle, ...]:
+def obstacles_in(observation: Observation) -> tuple[Obstacle, ...]:
     """What is in the way, as observed."""
     found = []
     for slot in np.flatnonzero(observation["obstacle_active"]):

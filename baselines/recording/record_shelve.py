@@ -45,9 +45,9 @@ def _up(height: float) -> Pose:
     return Pose.from_position_quaternion([0.0, 0.0, height])
 
 
-def _along(way: float) -> Pose:
+def _along(height: float) -> Pose:
     """A way along the direction that the hand points in, in the hand's frame."""
-    return Pose.from_position_quaternion([0.0, 0.0, way])
+    return Pose.from_position_quaternion([0.0, 0.0, height])
 
 
 def record_shelve(env: Any) -> Demonstration:

@@ -165,7 +165,7 @@ def recorded(
 def _joints_to(arm: Arm, q: np.ndarray, waypoint: Waypoint, dt: float) -> np.ndarray:
     """Joints (n, dof) at every tick of the way to a waypoint; slower where a joint would be too fast."""
     start = arm.fk(q)
-    distance, angle = start.gap(waypoint.tcp)
+    distance, angle = start.distance_to(waypoint.tcp)
     seconds = PEAK * max(distance / waypoint.linear, angle / waypoint.angular, dt)
     joints = _followed(arm, q, start, waypoint.tcp, seconds, dt)
     speed = np.abs(np.diff(joints, axis=0, prepend=q[None])).max(axis=0) / dt / arm.velocity_limits

@@ -40,5 +40,5 @@ def slug(value: Any) -> str:
 
 def link_to(file: Path, folder: Path) -> str:
     """The way from a folder to a file, as links have it: nothing in it can end the link or become markup."""
-    way = os.path.relpath(os.path.realpath(file), os.path.realpath(folder))
-    return _NO_LINK.sub(lambda found: b"%%%02X" % found[0][0], os.fsencode(way)).decode("ascii")
+    relative = os.path.relpath(os.path.realpath(file), os.path.realpath(folder))
+    return _NO_LINK.sub(lambda found: b"%%%02X" % found[0][0], os.fsencode(relative)).decode("ascii")

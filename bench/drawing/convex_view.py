@@ -25,7 +25,7 @@ CELLS = 420
 
 
 @dataclass(frozen=True)
-class View:
+class DrawingView:
     """An orthographic view.
 
     Attributes:
@@ -61,7 +61,7 @@ class Facet(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class ConvexSolid:
     """A convex solid: all points within `radius` of the hull of `core`.
 
     Attributes:
@@ -87,20 +87,20 @@ class Solid:
         """Smallest coordinate along a direction (3,) [m]."""
         return float((self.core @ direction).min()) - self.radius * float(np.linalg.norm(direction))
 
-    def outline(self, view: View, wider: float = 0.0) -> np.ndarray:
+    def outline(self, view: DrawingView, wider: float = 0.0) -> np.ndarray:
         """(k, 2) convex polygon: the solid, blown up by so much [m], as it is seen."""
         flat = view.flat(self.core)
         grown = self.radius + wider
         return hull(flat if grown == 0.0 else (flat[:, None] + grown * CIRCLE).reshape(-1, 2))
 
-    def hides(self, points: np.ndarray, view: View) -> np.ndarray:
+    def hides(self, points: np.ndarray, view: DrawingView) -> np.ndarray:
         """(n,) whether it is between points (n, 3), or round them, and the viewer."""
         if len(self.planes):
-            ahead, room = self.planes[:, :3] @ view.axes[2], points @ self.planes[:, :3].T + self.planes[:, 3]
-            ways = -room / np.where(np.abs(ahead) < 1e-9, np.nan, ahead)
-            enters = np.nanmax(np.where(ahead < -1e-9, ways, -np.inf), axis=1)
-            leaves = np.nanmin(np.where(ahead > 1e-9, ways, np.inf), axis=1)
-            beside = (room[:, np.abs(ahead) < 1e-9] > 0).any(axis=1)
+            ahead, outside = self.planes[:, :3] @ view.axes[2], points @ self.planes[:, :3].T + self.planes[:, 3]
+            margins = -outside / np.where(np.abs(ahead) < 1e-9, np.nan, ahead)
+            enters = np.nanmax(np.where(ahead < -1e-9, margins, -np.inf), axis=1)
+            leaves = np.nanmin(np.where(ahead > 1e-9, margins, np.inf), axis=1)
+            beside = (outside[:, np.abs(ahead) < 1e-9] > 0).any(axis=1)
             return (np.maximum(enters, 1e-6) < leaves) & ~beside
         ends, flat = view.flat(self.core), view.flat(points)
         along = ends[-1] - ends[0]
@@ -111,11 +111,11 @@ class Solid:
         return (off < self.radius) & (view.depth(points) < surface)
 
 
-def solid_of(shape: Shape, pose: Pose) -> Solid:
+def solid_of(shape: Shape, pose: Pose) -> ConvexSolid:
     """A shape of the planner, in the world."""
     turn, at = pose.rotation, pose.position
     if isinstance(shape, Sphere):
-        return Solid(at[None], shape.radius, np.zeros((0, 4)), (), "sphere")
+        return ConvexSolid(at[None], shape.radius, np.zeros((0, 4)), (), "sphere")
     if isinstance(shape, Capsule):
         half = 0.5 * shape.length * turn[:, 2]
         return ball_along(at - half, at + half, shape.radius)
@@ -125,16 +125,16 @@ def solid_of(shape: Shape, pose: Pose) -> Solid:
         half = 0.5 * shape.length * turn[:, 2]
         rims = [ring @ turn.T + at + offset for offset in (-half, half)]
         ends = (Facet(rims[0], -turn[:, 2]), Facet(rims[1], turn[:, 2]))
-        return Solid(np.vstack(rims), 0.0, _planes(np.vstack(rims)), ends, "cylinder")
+        return ConvexSolid(np.vstack(rims), 0.0, _planes(np.vstack(rims)), ends, "cylinder")
     points = corner_points(shape) @ turn.T + at
     kind = "box" if isinstance(shape, Box) else "mesh"
     assert isinstance(shape, Box | Mesh)
-    return Solid(points, 0.0, _planes(points), _facets(points), kind)
+    return ConvexSolid(points, 0.0, _planes(points), _facets(points), kind)
 
 
-def ball_along(a: np.ndarray, b: np.ndarray, radius: float) -> Solid:
+def ball_along(a: np.ndarray, b: np.ndarray, radius: float) -> ConvexSolid:
     """A capsule from a (3,) to b (3,) [m]."""
-    return Solid(np.stack([a, b]), radius, np.zeros((0, 4)), (), "capsule")
+    return ConvexSolid(np.stack([a, b]), radius, np.zeros((0, 4)), (), "capsule")
 
 
 def hull(points: np.ndarray) -> np.ndarray:
@@ -171,7 +171,7 @@ def union(outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
     return [np.array(line) for line in contour_generator(x, y, outside).lines(0.0)]
 
 
-def hidden_by(solids: Sequence[Solid], points: np.ndarray, view: View) -> np.ndarray:
+def hidden_by(solids: Sequence[ConvexSolid], points: np.ndarray, view: DrawingView) -> np.ndarray:
     """(n,) whether any solid hides points (n, 3)."""
     out = np.zeros(len(points), dtype=bool)
     for solid in solids:
@@ -179,7 +179,7 @@ def hidden_by(solids: Sequence[Solid], points: np.ndarray, view: View) -> np.nda
     return out
 
 
-def back_to_front(solids: Sequence[Solid], view: View) -> list[int]:
+def back_to_front(solids: Sequence[ConvexSolid], view: DrawingView) -> list[int]:
     """Indices in an order in which they can be painted."""
     count = len(solids)
     behind = np.zeros((count, count), dtype=bool)  # [i, j]: i must be painted before j
@@ -196,7 +196,9 @@ def back_to_front(solids: Sequence[Solid], view: View) -> list[int]:
     return order
 
 
-def best_view(shown: np.ndarray, aside: np.ndarray, solids: Sequence[Solid], ghosts: Sequence[Solid]) -> View:
+def best_view(
+    shown: np.ndarray, aside: np.ndarray, solids: Sequence[ConvexSolid], ghosts: Sequence[ConvexSolid]
+) -> DrawingView:
     """The direction from which a path is seen best: in the open, and apart from another one.
 
     Args:
@@ -206,10 +208,10 @@ def best_view(shown: np.ndarray, aside: np.ndarray, solids: Sequence[Solid], gho
         ghosts: what may hide it at less cost.
     """
     things = np.vstack([shown, *[solid.middle[None] for solid in solids]])
-    best, most = View(-60.0, 25.0), -math.inf
+    best, most = DrawingView(-60.0, 25.0), -math.inf
     for elevation in ELEVATIONS:
         for azimuth in AZIMUTHS:
-            view = View(float(azimuth), float(elevation))
+            view = DrawingView(float(azimuth), float(elevation))
             a, b = view.flat(shown), view.flat(aside)
             apart = np.linalg.norm(a[:, None] - b[None], axis=2).min(axis=1).mean()
             spread = np.ptp(a, axis=0).max()
@@ -221,7 +223,7 @@ def best_view(shown: np.ndarray, aside: np.ndarray, solids: Sequence[Solid], gho
     return best
 
 
-def _in_front(a: Solid, b: Solid, view: View) -> int:
+def _in_front(a: ConvexSolid, b: ConvexSolid, view: DrawingView) -> int:
     """1 if a is in front of b, -1 behind it, 0 if neither matters."""
     towards = view.axes[2]
     for first, second, sign in ((b, a, 1), (a, b, -1)):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .convex_view import Solid, View, union
+from .convex_view import ConvexSolid, DrawingView, union
 
 FACE, EDGE = (0.914, 0.722, 0.447), (0.47, 0.30, 0.07)
 SHELL_FACE, SHELL_EDGE = "#f3dcb4", "#d9a441"
@@ -19,7 +19,7 @@ SHINE = 9
 """Nested lighter outlines that make a ball look round."""
 
 
-def paint_solid(axes: Any, view: View, solid: Solid, zorder: float) -> None:
+def paint_solid(axes: Any, view: DrawingView, solid: ConvexSolid, zorder: float) -> None:
     """An obstacle."""
     from matplotlib.patches import Polygon
 
@@ -40,26 +40,26 @@ def paint_solid(axes: Any, view: View, solid: Solid, zorder: float) -> None:
     axes.add_patch(Polygon(outline, facecolor="none", edgecolor=EDGE, linewidth=1.0, zorder=zorder + 0.005))
 
 
-def _shine(axes: Any, view: View, solid: Solid, zorder: float) -> None:
+def _shine(axes: Any, view: DrawingView, solid: ConvexSolid, zorder: float) -> None:
     """A soft light spot, as nested outlines of thinner and thinner balls that move towards the light."""
     from matplotlib.patches import Polygon
 
     light = view.flat(LIGHT)
     for k in range(1, SHINE + 1):
         share = k / (SHINE + 1.0)
-        inner = Solid(solid.core, solid.radius * (1.0 - share), solid.planes, (), solid.kind)
+        inner = ConvexSolid(solid.core, solid.radius * (1.0 - share), solid.planes, (), solid.kind)
         flat = inner.outline(view) + 0.45 * share * solid.radius * light
         axes.add_patch(Polygon(flat, facecolor="white", edgecolor="none", alpha=0.075, zorder=zorder + 0.002))
 
 
-def paint_shells(axes: Any, view: View, solids: Sequence[Solid], distance: float) -> None:
+def paint_shells(axes: Any, view: DrawingView, solids: Sequence[ConvexSolid], distance: float) -> None:
     """What is closer to obstacles than the shell's distance [m], as one area."""
     if solids:
         style = {"edgecolor": SHELL_EDGE, "linewidth": 0.9, "linestyle": (0, (4, 3))}
         _paint_union(axes, [s.outline(view, distance) for s in solids], SHELL_FACE, 0.35, 6.0, style)
 
 
-def paint_arm(axes: Any, view: View, capsules: Sequence[Solid], posture: int) -> None:
+def paint_arm(axes: Any, view: DrawingView, capsules: Sequence[ConvexSolid], posture: int) -> None:
     """The arm's capsules in one posture as a pale shadow behind everything."""
     style = {"edgecolor": ARM_EDGE, "linewidth": 0.8, "linestyle": ARM_LINES[posture]}
     outlines = [capsule.outline(view) for capsule in capsules]
@@ -84,7 +84,7 @@ def _paint_union(
     axes.add_patch(PathPatch(area, facecolor="none", alpha=0.8, zorder=zorder + 0.1, **style))
 
 
-def paint_floor(axes: Any, view: View, low: np.ndarray, high: np.ndarray) -> None:
+def paint_floor(axes: Any, view: DrawingView, low: np.ndarray, high: np.ndarray) -> None:
     """A grid at the lower side of a box from low (3,) to high (3,) [m], its coordinates, and a scale of heights."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Polygon
@@ -118,14 +118,14 @@ def floor_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     )
 
 
-def scale_ends(view: View, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def scale_ends(view: DrawingView, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """(2, 3) foot and head of the scale of heights: at the corner of the floor that is leftmost in the picture."""
     corners = floor_corners(low, high)
     foot = corners[int(view.flat(corners)[:, 0].argmin())]
     return np.array([foot, [foot[0], foot[1], high[2]]])
 
 
-def _height_scale(axes: Any, view: View, low: np.ndarray, high: np.ndarray) -> None:
+def _height_scale(axes: Any, view: DrawingView, low: np.ndarray, high: np.ndarray) -> None:
     foot = scale_ends(view, low, high)[0]
     up = np.array([0.0, 0.0, 1.0])
     ticks = _ticks(low[2], high[2])
@@ -138,7 +138,7 @@ def _height_scale(axes: Any, view: View, low: np.ndarray, high: np.ndarray) -> N
     axes.text(x, y + 0.02, "z [m]", ha="center", va="bottom", fontsize=10, color=INK)
 
 
-def _label(axes: Any, view: View, at: np.ndarray, text: str, size: float = 8.5) -> None:
+def _label(axes: Any, view: DrawingView, at: np.ndarray, text: str, size: float = 8.5) -> None:
     axes.text(*view.flat(at), text, ha="center", va="center", fontsize=size, color=INK, zorder=8, clip_on=True)
 
 

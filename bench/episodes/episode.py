@@ -54,7 +54,7 @@ def run_episode(
 ) -> tuple[EpisodeRecord, PolicyReport]:
     """Run one scenario to its end; success is what the environment says at the end."""
     played = play(env, policy, scenario, observer)
-    return judged(env, played, scenario, config), played.report
+    return episode_record(env, played, scenario, config), played.report
 
 
 def play(env: Any, policy: Policy, scenario: Scenario, observer: Observer | None = None) -> Played:
@@ -98,7 +98,7 @@ def _watching(recorder: TraceRecorder, observer: Observer | None) -> Observer:
     return watch
 
 
-def judged(
+def episode_record(
     env: Any, played: Played, scenario: Scenario, config: RunConfig, trajectories: Path | None = None
 ) -> EpisodeRecord:
     """The record of an episode.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...baselines.policy import LabeledPath, Policy
-from ...baselines.programs.world_model import intruders_of
+from ...baselines.programs.world_model import obstacles_in
 from ...configs.grid import RunConfig
 from ...envs.core.description import TaskObject
 from ...planner.errors import RenderingUnavailable
@@ -71,7 +71,7 @@ def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video
                 seen.furniture += each.at(Pose.from_vector(pose))
         tcp.append(observation["tcp_pose"][0, :3])
         seen.end = observation["object_pose"]
-        for obstacle in intruders_of(observation):
+        for obstacle in obstacles_in(observation):
             seen.obstacles[obstacle.name] = obstacle
             seen.traces.setdefault(obstacle.name, []).append(obstacle.pose.position)
         if film and len(tcp) % EVERY == 1:

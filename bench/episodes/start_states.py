@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.simulation.moving_obstacles import Intruder, described
+from ...envs.simulation.moving_obstacles import ScheduledObstacle, described
 from .scenarios import Scenario, ScenarioChanged
 
 OBSERVED = ("joint_positions", "object_pose", "goal_pose", "furniture_pose")
@@ -22,14 +22,14 @@ def drawn_start(env: Any, observation: Mapping[str, np.ndarray]) -> dict[str, An
     """Objects, goals, joints and obstacles of an environment that has just been reset, as JSON can hold them.
 
     Poses are x y z [m] and wxyz in the world, joints [rad]; obstacles as in
-    `envs.simulation.moving_obstacles.Intruder`.
+    `envs.simulation.moving_obstacles.ScheduledObstacle`.
     """
     start: dict[str, Any] = {key: _rounded(observation[key]) for key in OBSERVED if key in observation}
-    start["obstacles"] = [obstacle(each) for each in env.unwrapped.sim.obstacles.intruders]
+    start["obstacles"] = [obstacle(each) for each in env.unwrapped.sim.obstacles.scheduled_obstacles]
     return start
 
 
-def obstacle(each: Intruder) -> dict[str, Any]:
+def obstacle(each: ScheduledObstacle) -> dict[str, Any]:
     """Shape, size, place and motion of an obstacle."""
     numbers = {key: _rounded(getattr(each, key)) for key in ("center", "rotation", "long", "short")}
     scalars = {key: _rounded(getattr(each, key)) for key in ("frequency", "phase", "delay")}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...configs.run_config import RunConfig
-from ...envs.simulation.moving_obstacles import Intruder
+from ...envs.simulation.moving_obstacles import ScheduledObstacle
 from ...planner.geometry.shapes import Sphere
 from ..metrics.metric_table import METRICS
 from ..task_table import TASKS
@@ -72,7 +72,7 @@ def _obstacles(level: str, rng: np.random.Generator) -> list[dict[str, Any]]:
     if level not in DEMANDING:
         return []
     speed = float(rng.uniform(0.05, 0.3)) if level == "L4" and rng.uniform() < 0.7 else 0.0
-    return [obstacle(Intruder(Sphere(0.05), (0.1, 0.0, 1.0), long=(0.0, 0.1, 0.0), frequency=10.0 * speed))]
+    return [obstacle(ScheduledObstacle(Sphere(0.05), (0.1, 0.0, 1.0), long=(0.0, 0.1, 0.0), frequency=10.0 * speed))]
 
 
 def _cell(task: str, level: str, method: str, episodes: int, seed: int) -> RunConfig:
@@ -80,7 +80,7 @@ def _cell(task: str, level: str, method: str, episodes: int, seed: int) -> RunCo
         name="synthetic",
         task=task,
         method=method,
-        demonstration=TASKS[task].shown or task,
+        demonstration=TASKS[task].demonstrated_task or task,
         episodes=episodes,
         level=level,
         seed=seed,
@@ -108,7 +108,7 @@ def _record(cell: RunConfig, scenario: dict[str, Any], rng: np.random.Generator)
         "log_dimensionless_jerk": float(rng.normal(-14.0 - HARDNESS.get(level, 0.5), 1.0)),
         "sparc": float(rng.normal(-2.3, 0.2)),
         "deviation": float(rng.gamma(2.0, 0.005)),
-        **{name: float(rng.gamma(2.0, 0.002)) for name in TASKS[task].judged},
+        **{name: float(rng.gamma(2.0, 0.002)) for name in TASKS[task].task_metrics},
     }
     blank = EpisodeRecord(
         scenario["index"], scenario["seed"], method, task, "Panda", level, success, not touched,

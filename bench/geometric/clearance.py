@@ -15,7 +15,7 @@ import numpy as np
 from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import PosePath
 from ...planner.geometry.shapes import Obstacle
-from ...planner.judge.geometry import Moment, Scene
+from ...planner.judge.geometry import CollisionWorld, Moment
 from ...planner.robot.body import Body
 
 FAR = 0.05
@@ -25,7 +25,7 @@ SHORTEST = 2e-4
 HALVINGS = 24
 
 
-class Clearance(NamedTuple):
+class PathClearance(NamedTuple):
     """What was found of a path.
 
     Attributes:
@@ -47,44 +47,44 @@ class ToolJudge:
 
     def __init__(self, tool: np.ndarray, obstacles: Sequence[Obstacle]):
         rows = np.column_stack([np.zeros(len(tool)), tool])
-        self._scene = Scene(Body(rows, tuple(f"capsule{k}" for k in range(len(tool)))), obstacles)
+        self._scene = CollisionWorld(Body(rows, tuple(f"capsule{k}" for k in range(len(tool)))), obstacles)
         self._ends, self._radii = tool[:, :6].reshape(-1, 2, 3), tool[:, 6]
         self._turns = np.array([_turn_to(b - a) for a, b in self._ends])
         self._count = len(obstacles)
 
-    def judged(self, path: PosePath) -> Clearance:
+    def clearance_of(self, path: PosePath) -> PathClearance:
         """The verdict on a path."""
         if not self._count:
-            return Clearance(True, FAR)
+            return PathClearance(True, FAR)
         moment = self._moment(path.dqs)
-        room = self._rooms(moment)
-        least = min(FAR, float(room.min()))
+        clearance = self._clearances(moment)
+        least = min(FAR, float(clearance.min()))
         if least <= 0.0:
-            return Clearance(False, least)
-        return self._between(path.dqs, room, least)
+            return PathClearance(False, least)
+        return self._between(path.dqs, clearance, least)
 
-    def _between(self, poses: np.ndarray, room: np.ndarray, least: float) -> Clearance:
+    def _between(self, poses: np.ndarray, clearance: np.ndarray, least: float) -> PathClearance:
         """Halve every stretch that its ends do not prove clear."""
-        first, last, before, after = poses[:-1], poses[1:], room[:-1], room[1:]
+        first, last, before, after = poses[:-1], poses[1:], clearance[:-1], clearance[1:]
         for _ in range(HALVINGS):
-            way = self._ways(first, last)
+            displacement = self._displacements(first, last)
             # of what is beyond FAR only that is known: it is taken for FAR
-            undecided = (before + after <= way[:, :, None]).any(axis=(1, 2))
+            undecided = (before + after <= displacement[:, :, None]).any(axis=(1, 2))
             if not undecided.any():
-                return Clearance(True, least)
-            if (way.max(axis=1)[undecided] < SHORTEST).any():
-                return Clearance(False, least)
+                return PathClearance(True, least)
+            if (displacement.max(axis=1)[undecided] < SHORTEST).any():
+                return PathClearance(False, least)
             first, last, before, after = (each[undecided] for each in (first, last, before, after))
             middle = dq.sclerp(first, last, np.full(len(first), 0.5))
-            found = self._rooms(self._moment(middle))
+            found = self._clearances(self._moment(middle))
             least = min(least, float(found.min()))
             if least <= 0.0:
-                return Clearance(False, least)
+                return PathClearance(False, least)
             first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
             before, after = np.concatenate([before, found]), np.concatenate([found, after])
-        return Clearance(False, least)
+        return PathClearance(False, least)
 
-    def _rooms(self, moment: Moment) -> np.ndarray:
+    def _clearances(self, moment: Moment) -> np.ndarray:
         """(n, m, k) distances [m], at most FAR."""
         out = np.minimum(self._scene.at_least(moment), FAR)
         near = np.argwhere(out < FAR)
@@ -100,7 +100,7 @@ class ToolJudge:
         nothing = np.empty((len(poses), 0, 3))
         return Moment(np.zeros(len(poses)), np.empty((len(poses), 0)), nothing, nothing, ends, turns, turn)
 
-    def _ways(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    def _displacements(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         """(n, m) longest way [m] of a point of each capsule along the screws."""
         twist = dq.twist_from_dq(dq.mul(dq.conj(first), last))
         v, w = twist[:, None, None, :3], twist[:, None, None, 3:]

@@ -30,7 +30,7 @@ EXTRAS = {"dmp-goal": "movement_primitives", "dmp-world": "movement_primitives",
 """Modules that path makers need."""
 
 
-class Order(NamedTuple):
+class GeometricRequest(NamedTuple):
     """What is wanted.
 
     Attributes:
@@ -65,7 +65,7 @@ def run_geometric(
         WorkerFailed: a worker died, or could not do its work.
     """
     say = console(stderr=True, quiet=quiet)
-    order = Order(count, seed, wanted_methods(methods, say), workers or cores())
+    order = GeometricRequest(count, seed, wanted_methods(methods, say), workers or cores())
     output.mkdir(parents=True, exist_ok=True)
     try:
         with alone(output, "geometric"), ExitStack() as held:
@@ -97,7 +97,9 @@ def wanted_methods(names: Sequence[str], say: Any) -> tuple[str, ...]:
         if name not in METHODS:
             raise UnknownName("method", name, METHODS)
         if missing(name):
-            raise BadConfig("command line", "--method", f"{name!r} needs {EXTRAS[METHODS[name].maker]}: see its extra")
+            raise BadConfig(
+                "command line", "--method", f"{name!r} needs {EXTRAS[METHODS[name].generator]}: see its extra"
+            )
     if names:
         return tuple(dict.fromkeys(names))
     left_out = [name for name in METHODS if missing(name)]
@@ -108,11 +110,11 @@ def wanted_methods(names: Sequence[str], say: Any) -> tuple[str, ...]:
 
 def missing(name: str) -> bool:
     """Whether what a method needs is not installed."""
-    module = EXTRAS.get(METHODS[name].maker)
+    module = EXTRAS.get(METHODS[name].generator)
     return module is not None and find_spec(module) is None
 
 
-def frozen_suite(folder: Path, order: Order, dispatcher: Dispatcher) -> GeometricSuite:
+def frozen_suite(folder: Path, order: GeometricRequest, dispatcher: Dispatcher) -> GeometricSuite:
     """The scenarios of a folder, drawn if there are none.
 
     Raises:
@@ -133,7 +135,7 @@ def frozen_suite(folder: Path, order: Order, dispatcher: Dispatcher) -> Geometri
     return suite
 
 
-def wanted_rows(suite: GeometricSuite, order: Order) -> Iterator[tuple[str, str, str, int]]:
+def wanted_rows(suite: GeometricSuite, order: GeometricRequest) -> Iterator[tuple[str, str, str, int]]:
     """Track, variant, method and scenario of every row, in the order of the tables."""
     for each in suite.scenarios:
         for method in chosen(TRACKS["paths"], order):
@@ -149,7 +151,7 @@ def wanted_rows(suite: GeometricSuite, order: Order) -> Iterator[tuple[str, str,
                     yield "frames", variant, method, index
 
 
-def chosen(names: Sequence[str], order: Order) -> list[str]:
+def chosen(names: Sequence[str], order: GeometricRequest) -> list[str]:
     """Those methods of a track that are wanted."""
     return [name for name in names if name in order.methods]
 
@@ -163,7 +165,9 @@ def first_of_each(suite: GeometricSuite, levels: Sequence[str], count: int) -> l
     return found
 
 
-def completed(folder: Path, suite: GeometricSuite, order: Order, dispatcher: Dispatcher, say: Any) -> list[Row]:
+def completed(
+    folder: Path, suite: GeometricSuite, order: GeometricRequest, dispatcher: Dispatcher, say: Any
+) -> list[Row]:
     """All rows of the folder, in the tables' order; what is wanted and missing is made, and written as it comes."""
     from rich.progress import Progress
 

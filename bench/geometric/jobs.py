@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...baselines.key_poses import Join, filled
-from ...baselines.motion.motion_method import LegPlanner
+from ...baselines.motion.motion_method import MotionPlanner
 from ...baselines.motion.path_generators import straight_path
-from ...baselines.paths_only import leg_planner, made_path
+from ...baselines.paths_only import made_path, motion_planner
 from ...planner.errors import NotFinite, NotUnit, OneDemoError, PlanFailed
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Obstacle
@@ -29,8 +29,8 @@ from ..atomic_files import sha256_of
 from ..workers.worker_process import main
 from . import metrics
 from .clearance import ToolJudge
-from .parts import Part, holding, part_named, robot, tool_of
-from .suite import GeometricSuite, Scenario, drawn, read_suite
+from .parts import CarriedPart, holding, part_named, robot, tool_of
+from .suite import GeometricScenario, GeometricSuite, drawn, read_suite
 
 SHIPPED_GUIDE = 0.5
 COMMON = 0.3
@@ -53,13 +53,13 @@ class Method(NamedTuple):
     """A row of the tables.
 
     Attributes:
-        maker: the policy whose path maker it is.
+        generator: the policy whose path maker it is.
         guide: fraction at which its blend ends.
         join: how it reads the way between key poses.
         planned: the path is that of an arm whose motion was planned; else that of a tool that flies freely.
     """
 
-    maker: str
+    generator: str
     guide: float = GUIDE_START
     join: Join = straight_path
     planned: bool = False
@@ -89,26 +89,26 @@ TRACKS = {
 Row = dict[str, Any]
 
 
-def rows_of(scenario: Scenario, track: str, variant: str, methods: Sequence[str]) -> list[Row]:
+def rows_of(scenario: GeometricScenario, track: str, variant: str, methods: Sequence[str]) -> list[Row]:
     """A row for each method."""
     one = {"paths": path_row, "sparse": sparse_row, "frames": frames_row}[track]
     head = {"track": track, "variant": variant, "index": scenario.index, "part": scenario.part, "level": scenario.level}
     return [{**head, "method": name, **one(scenario, variant, name)} for name in methods]
 
 
-def path_row(scenario: Scenario, variant: str, name: str) -> Row:
+def path_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
     """The numbers of a method's path in a scenario."""
     return measured(scenario, name, part_named(scenario.part).shown)
 
 
-def sparse_row(scenario: Scenario, variant: str, name: str) -> Row:
+def sparse_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
     """The numbers of a path that was made from so many key poses, against the whole demonstration."""
     part = part_named(scenario.part)
     keys = key_poses(part.shown, int(variant))
     return measured(scenario, name, filled(keys, METHODS[name].join), aligned_from=COMMON)
 
 
-def frames_row(scenario: Scenario, variant: str, name: str) -> Row:
+def frames_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
     """How far a path made in another frame, expressed back, is from the path made in the first."""
     part, begun = part_named(scenario.part), time.perf_counter()
     shown, start, goal, obstacles, tool = (
@@ -141,7 +141,7 @@ def _in_frame(tool: np.ndarray, tcp_from_other: Pose) -> np.ndarray:
 
 
 def made(
-    scenario: Scenario,
+    scenario: GeometricScenario,
     name: str,
     shown: PosePath,
     start: Pose,
@@ -162,16 +162,16 @@ def made(
         if not plan.success:
             raise PlanFailed(plan.reason, plan.detail)
         return PosePath(np.array([robot().arm.fk(q).dq for q in plan.joints]))
-    return made_path(method.maker, shown, start, goal, obstacles, tool=tool, settings=settings, guide=guide)
+    return made_path(method.generator, shown, start, goal, obstacles, tool=tool, settings=settings, guide=guide)
 
 
 @cache
-def _planner(name: str, part: str) -> LegPlanner:
+def _planner(name: str, part: str) -> MotionPlanner:
     method = METHODS[name]
-    return leg_planner(method.maker, robot().arm, holding(part), {"motion": {"guide": method.guide}})
+    return motion_planner(method.generator, robot().arm, holding(part), {"motion": {"guide": method.guide}})
 
 
-def measured(scenario: Scenario, name: str, shown: PosePath, aligned_from: float | None = None) -> Row:
+def measured(scenario: GeometricScenario, name: str, shown: PosePath, aligned_from: float | None = None) -> Row:
     """Make a path and take its numbers; what there is none of is None.
 
     Args:
@@ -187,12 +187,12 @@ def measured(scenario: Scenario, name: str, shown: PosePath, aligned_from: float
         return {"made": False, "reason": _reason(failure), "reached": False, "clear": False, "ms": _since(begun)}
     taken = _since(begun)
     since = METHODS[name].guide if aligned_from is None else aligned_from
-    clearance = ToolJudge(tool_of(part.name), scenario.obstacles).judged(path)
+    clearance = ToolJudge(tool_of(part.name), scenario.obstacles).clearance_of(path)
     return {"made": True, "reason": "", **numbers(part, path, scenario.goal, since), "clear": clearance.clear,
             "clearance": clearance.least, "ms": taken}  # fmt: skip
 
 
-def numbers(part: Part, path: PosePath, goal: Pose, aligned_from: float) -> Row:
+def numbers(part: CarriedPart, path: PosePath, goal: Pose, aligned_from: float) -> Row:
     """The numbers of a path that do not depend on obstacles."""
     distance, angle = metrics.ending(path, goal)
     turned = metrics.turning(part.shown)
@@ -202,7 +202,7 @@ def numbers(part: Part, path: PosePath, goal: Pose, aligned_from: float) -> Row:
         "tilt": metrics.tilt(part, path),
         "tilt_excess": metrics.tilt(part, path) - part.shown_tilt,
         "rim_drift": metrics.rim_drift(part, path, goal),
-        "way": metrics.way(path) / metrics.way(part.shown),
+        "way": metrics.path_length(path) / metrics.path_length(part.shown),
         "turning": metrics.turning(path) / turned if turned > LEAST_TURNING else math.nan,
         "jerk": metrics.jerk(path),
         "aligned": metrics.aligned_deviation(part, path, goal, aligned_from),

@@ -7,7 +7,7 @@ import numpy as np
 from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
 from ...planner.imitation.tsia import guide_index, imitated_path
-from .parts import POURING, Part
+from .parts import POURING, CarriedPart
 
 REACHED, TURNED = 0.005, 0.05
 """A goal is reached within these [m], [rad]; as the judge of plans has it."""
@@ -20,7 +20,7 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 def ending(path: PosePath, goal: Pose) -> tuple[float, float]:
     """Distance [m] and angle [rad] of a path's end to the goal."""
-    distance, angle = path[-1].gap(goal)
+    distance, angle = path[-1].distance_to(goal)
     return float(distance), float(angle)
 
 
@@ -29,12 +29,12 @@ def is_reached(distance: float, angle: float) -> bool:
     return distance <= REACHED and angle <= TURNED
 
 
-def tilt(part: Part, path: PosePath) -> float:
+def tilt(part: CarriedPart, path: PosePath) -> float:
     """Largest tilt while carrying [degrees]; before pouring begins, where something is poured."""
     return float(np.degrees(part.tilts(part.carried(path)).max()))
 
 
-def rim_drift(part: Part, path: PosePath, goal: Pose) -> float | None:
+def rim_drift(part: CarriedPart, path: PosePath, goal: Pose) -> float | None:
     """How far [m] the lip is, while the glass is tilted by more than 60 degrees, from where it was shown.
 
     Both as seen from the goal, which stands for the target glass. The demonstration's lip goes along a curve, of which
@@ -57,14 +57,14 @@ def _to_line(point: np.ndarray, line: np.ndarray) -> float:
     return float(np.linalg.norm(point - nearest, axis=1).min())
 
 
-def way(path: PosePath) -> float:
+def path_length(path: PosePath) -> float:
     """Length of the tcp's way [m]."""
     return float(np.linalg.norm(np.diff(path.positions, axis=0), axis=1).sum())
 
 
 def turning(path: PosePath) -> float:
     """Sum of all rotations [rad]."""
-    return float(dq.gap(path.dqs[:-1], path.dqs[1:])[1].sum())
+    return float(dq.pose_distance(path.dqs[:-1], path.dqs[1:])[1].sum())
 
 
 def jerk(path: PosePath) -> float:
@@ -84,7 +84,7 @@ def jerk(path: PosePath) -> float:
     return float(np.log(max((third**2).sum(axis=1).mean(), 1e-300) ** 0.5 / along[-1]))
 
 
-def aligned_deviation(part: Part, path: PosePath, goal: Pose, guide: float) -> float:
+def aligned_deviation(part: CarriedPart, path: PosePath, goal: Pose, guide: float) -> float:
     """Method-aligned: largest distance [m] of the goal-aligned demonstration behind the guiding pose to a path.
 
     In screw length. What follows imitation alone has none by construction, so this says nothing about who is better.
@@ -107,7 +107,7 @@ def curve_gap(poses: PosePath, path: PosePath, refinements: int = FINE) -> float
 
 
 def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    distance, angle = dq.gap(a, b)
+    distance, angle = dq.pose_distance(a, b)
     return np.hypot(distance, METERS_PER_RADIAN * angle)
 
 

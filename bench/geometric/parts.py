@@ -58,7 +58,7 @@ KINDS = {
 """By name. On its way turned from lying to standing, a book has no upright; its hand stays level."""
 
 
-class Part:
+class CarriedPart:
     """A segment with what is held.
 
     Args:
@@ -142,12 +142,12 @@ def _turned(path: PosePath, vector: np.ndarray) -> np.ndarray:
 
 
 @cache
-def part_named(name: str) -> Part:
+def part_named(name: str) -> CarriedPart:
     """A part, loaded once."""
-    return Part(name)
+    return CarriedPart(name)
 
 
-class Robot(NamedTuple):
+class ArmWithBody(NamedTuple):
     """Whose hand moves.
 
     Attributes:
@@ -160,12 +160,12 @@ class Robot(NamedTuple):
 
 
 @cache
-def robot() -> Robot:
+def robot() -> ArmWithBody:
     """The Panda."""
     from ...envs.scene.robot_bodies import robot_body
     from ...envs.scene.scene import compiled_scene
 
-    return Robot(compiled_scene(ROBOT).arms[0].arm, robot_body(ROBOT))
+    return ArmWithBody(compiled_scene(ROBOT).arms[0].arm, robot_body(ROBOT))
 
 
 @cache

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.core.obstacle_placement import Leg, Order, Stage, placed
-from ...envs.simulation.moving_obstacles import Intruder
+from ...envs.core.obstacle_placement import ObstacleRequest, PlacementContext, PlacementMotion, placed
+from ...envs.simulation.moving_obstacles import ScheduledObstacle
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.errors import BadConfig, BadOption
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box, Capsule, Obstacle, Shape, Sphere
 from ..atomic_files import canonical, sha256_of, write_whole
-from .parts import KINDS, Part, part_named, robot
+from .parts import KINDS, CarriedPart, part_named, robot
 
 FILE = "suite.jsonl"
 VERSION = 1
@@ -61,7 +61,7 @@ LEVELS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Scenario:
+class GeometricScenario:
     """A path to make.
 
     Attributes:
@@ -115,7 +115,7 @@ def drawn(index: int, seed: int) -> dict[str, Any]:
     raise BadOption("seed", f"{seed} gives no feasible scenario {index} ({name}, {level}) in {TRIES} draws")
 
 
-def _drawn_once(part: Part, far: Range, rng: np.random.Generator) -> tuple | None:
+def _drawn_once(part: CarriedPart, far: Range, rng: np.random.Generator) -> tuple | None:
     """Start, goal, joints and obstacles of one draw; None where the arm cannot be at both ends, or has no room."""
     shown = part.shown
     start = _moved(shown[0], shown[0].position, far.start, far.start_yaw, rng)
@@ -127,9 +127,9 @@ def _drawn_once(part: Part, far: Range, rng: np.random.Generator) -> tuple | Non
         return start, goal, joints, ()
     up = Pose.from_position_quaternion([0.0, 0.0, part.kind.raised])
     above = ((up @ goal,),) if part.kind.raised else ()
-    leg = Leg(up @ start, up @ goal, ((start,), *above, (goal,)), part.shape, part.tcp_from_object, 0)
-    stage = Stage([leg], robot().arm, robot().body, joints, [], [], FLOOR)
-    orders = [Order("static", 0)] * int(rng.integers(1, far.obstacles + 1))
+    leg = PlacementMotion(up @ start, up @ goal, ((start,), *above, (goal,)), part.shape, part.tcp_from_object, 0)
+    stage = PlacementContext([leg], robot().arm, robot().body, joints, [], [], FLOOR)
+    orders = [ObstacleRequest("static", 0)] * int(rng.integers(1, far.obstacles + 1))
     found = placed(rng, "static", stage, orders)
     return None if found is None else (start, goal, joints, found)
 
@@ -162,7 +162,7 @@ def _pose(vector: Sequence[float]) -> Pose:
     return Pose.from_position_quaternion(vector[:3], turn / np.linalg.norm(turn))
 
 
-def _written(one: Intruder) -> dict[str, Any]:
+def _written(one: ScheduledObstacle) -> dict[str, Any]:
     shape = one.shape
     size: dict[str, Any] = {}
     if isinstance(shape, Box):
@@ -182,12 +182,12 @@ def _shape(values: Mapping[str, Any]) -> Shape:
     return Sphere(values["radius"])
 
 
-def scenario_of(values: Mapping[str, Any]) -> Scenario:
+def scenario_of(values: Mapping[str, Any]) -> GeometricScenario:
     """A scenario from its line in the file."""
     obstacles = tuple(
         Obstacle(_shape(each), _pose(each["pose"]), name=f"obstacle{k}") for k, each in enumerate(values["obstacles"])
     )
-    return Scenario(
+    return GeometricScenario(
         values["index"], values["part"], values["level"], _pose(values["start"]), _pose(values["goal"]),
         tuple(values["joints"]), obstacles, values["draws"],
     )  # fmt: skip

@@ -27,7 +27,7 @@ MOST = 500
 """Poses of a motion that are compared."""
 
 
-class Shown(NamedTuple):
+class DemonstrationShape(NamedTuple):
     """What of a demonstration the carries of an episode are compared with.
 
     Attributes:
@@ -46,18 +46,18 @@ def demonstration_named(name: str) -> Demonstration | None:
 
 
 @lru_cache(maxsize=16)
-def shown(demonstration: Demonstration | None, task: str) -> Shown | None:
+def shown(demonstration: Demonstration | None, task: str) -> DemonstrationShape | None:
     """The demonstrated carry of a task; None where the demonstration has none to compare with."""
-    kept = TASKS[task].kept
+    compared_segment = TASKS[task].compared_segment
     segments = {} if demonstration is None else {segment.name: segment for segment in demonstration.segments}
-    if demonstration is None or kept not in segments:
+    if demonstration is None or compared_segment not in segments:
         return None
     first = min(segment.start for segment in segments.values() if segment.held)
-    way = demonstration.path.positions[first : segments[kept].stop + 1]
-    path = resampled(trimmed(demonstration.segment_path(kept), FUMBLING), SPACING)
+    carried = demonstration.path.positions[first : segments[compared_segment].stop + 1]
+    path = resampled(trimmed(demonstration.segment_path(compared_segment), FUMBLING), SPACING)
     start = int(np.searchsorted(path.lengths(), (1.0 - KEPT) * path.lengths()[-1]))
     tail = path[start:].moved(path[-1].inverse())
-    return Shown(length_of(way), np.array([pose.matrix for pose in tail]))
+    return DemonstrationShape(length_of(carried), np.array([pose.matrix for pose in tail]))
 
 
 def length_of(points: np.ndarray) -> float:
@@ -79,12 +79,12 @@ def end_of(trace: Trace, carry: Carry, *, poured: bool) -> int:
     return carry.first + int(np.argmax(tilts(trace.objects[carry.first : carry.last + 1, carry.object])))
 
 
-def way_ratio(trace: Trace, carry: Carry, end: int, wanted: Shown) -> float:
+def way_ratio(trace: Trace, carry: Carry, end: int, wanted: DemonstrationShape) -> float:
     """Length of the tcp's way from the grasp to the carry's end over the demonstration's."""
     return length_of(trace.tcp[carry.first : end + 1, carry.arm, :3]) / wanted.length
 
 
-def deviation(trace: Trace, carry: Carry, end: int, wanted: Shown) -> float | None:
+def deviation(trace: Trace, carry: Carry, end: int, wanted: DemonstrationShape) -> float | None:
     """Frechet distance [m] of the carry's end to the demonstration moved rigidly to where the carry ended.
 
     "Method-aligned": a method that imitates by moving the demonstration rigidly has about zero by construction, so

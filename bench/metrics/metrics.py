@@ -48,7 +48,11 @@ def metrics_of(
         "clearance_held": near.held,
         "tilt": tilt,
         "tilt_integral": tilting,
-        **{name: max(map(abs, numbers[key]), default=None) for name, key in facts.judged.items() if key in numbers},
+        **{
+            name: max(map(abs, numbers[key]), default=None)
+            for name, key in facts.task_metrics.items()
+            if key in numbers
+        },
         "path_length": sum(length_of(trace.tcp[:, arm, :3]) for arm in range(trace.tcp.shape[1])),
         "rotation_length": sum(turning_of(trace.tcp[:, arm, 3:]) for arm in range(trace.tcp.shape[1])),
         "time_to_goal": float(trace.time[-1]) if success else None,

@@ -98,7 +98,7 @@ class TraceRecorder:
         """What was taken down."""
         joints, tcp, objects, held, active, places = (np.array(column) for column in zip(*self._rows, strict=True))
         kinds, sizes = np.zeros(active.shape[1]), np.zeros((active.shape[1], 3))
-        for slot, each in enumerate(self._sim.obstacles.intruders):
+        for slot, each in enumerate(self._sim.obstacles.scheduled_obstacles):
             kinds[slot], sizes[slot] = KINDS[type(each.shape)], described(each.shape)
         time = self._dt * np.arange(len(joints))
         return Trace(time, joints, self._columns, tcp, objects, held, active, places, kinds, sizes)

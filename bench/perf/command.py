@@ -36,12 +36,12 @@ HELP = "onedemo --help"
 
 def _panda() -> tuple[Any, np.ndarray, np.ndarray]:
     """The workspace of the Panda's controller, joints, and a target (8,) in reach."""
-    from ...planner.control.arm_arrays import bound
+    from ...planner.control.arm_arrays import arm_arrays
     from ...planner.control.controller import ControllerSettings
     from ...planner.robot.arm import Arm
 
     arm = Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8")
-    return bound(arm, ControllerSettings(law="paper").packed()), READY, np.array(arm.fk(READY + 0.1).dq)
+    return arm_arrays(arm, ControllerSettings(law="paper").packed()), READY, np.array(arm.fk(READY + 0.1).dq)
 
 
 def _kinematics() -> Row:

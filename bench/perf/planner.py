@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...planner.collision import clearance, proximity
-from ...planner.collision.edge_certificates import tool_work
-from ...planner.collision.robot_arrays import WORLD, place_capsules, robot_work
-from ...planner.control.arm_arrays import bound
+from ...planner.collision.edge_certificates import tool_arrays
+from ...planner.collision.robot_arrays import WORLD, place_capsules, robot_arrays
+from ...planner.control.arm_arrays import arm_arrays
 from ...planner.escape import escape_tree
 from ...planner.escape.repet import RepetSettings, escape_path, point_tool
 from ...planner.geometry.pose import Pose, PosePath
@@ -93,7 +93,7 @@ def _level(name: str, shape: Shape, goal: float) -> Row:
     directions = rng.normal(size=(5, 3))
     places = 0.25 * directions / np.linalg.norm(directions, axis=1)[:, None]
     obstacles = [Obstacle(shape, Pose.from_yaw(place, 0.3)) for place in places]
-    g, options = tool_work(point_tool(0.02), pack(obstacles), margin=0.02), RepetSettings().packed()
+    g, options = tool_arrays(point_tool(0.02), pack(obstacles), margin=0.02), RepetSettings().packed()
     options[escape_tree.WIDEST], options[escape_tree.RANDOM] = 0.02, 0.0  # the first tree has no random children
     tree, cells, state = np.zeros((16, escape_tree.TREE_WIDTH)), np.full(64, -1.0), np.ones(1)
     tree[0, 0], towards = 1.0, np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0, 0.0]])
@@ -108,10 +108,10 @@ def _level(name: str, shape: Shape, goal: float) -> Row:
 def _tick(count: int) -> Callable[[], object]:
     """A control step from Python, the whole arm kept clear of so many obstacles, of an arm that sways."""
     arm, body, q = _panda()
-    work = bound(arm, PlanSettings().motion.controller.packed())
+    work = arm_arrays(arm, PlanSettings().motion.controller.packed())
     target, out, settings = np.array(arm.fk(q + 0.05).dq), np.empty(arm.dof), SafetySettings()
     packed = pack(_spread(count, MIXED))
-    g = robot_work((arm,), (body,), packed, margin=settings.distance, settings=settings.packed(0.02))
+    g = robot_arrays((arm,), (body,), packed, margin=settings.distance, settings=settings.packed(0.02))
     sway = cycle([q + 0.1 * np.sin(2.0 * np.pi * k / SWAY) for k in range(SWAY)])
     return lambda: safe_tick(work, g, next(sway), target, 1.0, 0.02, out)
 
@@ -151,14 +151,14 @@ def _whole_arm(name: str) -> Row:
     rows = body.rows[[k for k, r in enumerate(body.rows) if r[0] >= 0][:8]]
     eight = type(body)(rows, tuple(f"c{k}" for k in range(8)))
     obstacles = _spread(20, MIXED)
-    g = robot_work((arm,), (eight,), pack(obstacles), settings=SafetySettings().packed(0.02))
+    g = robot_arrays((arm,), (eight,), pack(obstacles), settings=SafetySettings().packed(0.02))
     place_capsules(g, q, WORLD)
     model, data = _mujoco_twin(mujoco, g[WORLD : WORLD + 8], rows[:, 7], obstacles)
 
     def theirs() -> float:
         return min(mujoco.mj_geomDistance(model, data, i, 8 + k, 10.0, None) for i in range(8) for k in range(20))
 
-    ours, peer = seconds_per_call(lambda: clearance.least_room(g, WORLD, 0.0, 10.0), theirs)
+    ours, peer = seconds_per_call(lambda: clearance.min_slack(g, WORLD, 0.0, 10.0), theirs)
     note = f"{ours * 1e6:.2f} us against {peer * 1e6:.0f} us for 160 pairs"
     return row(name, ours / peer, "ratio", 0.1, note)
 
@@ -206,7 +206,7 @@ def _plan_row(name: str) -> Row:
     except ImportError:
         return Row(name, None, "ratio", 0.5, None, "needs: pip install 'onedemo[ompl]'")
     settings = SafetySettings()
-    g = robot_work(
+    g = robot_arrays(
         (planner.arm,), (planner.body,), pack([ball]), margin=settings.distance, settings=settings.packed(0.02)
     )
     plan = planner.plan(demo, q, goal, [ball])

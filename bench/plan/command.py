@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...configs.plan_scene import Scene, load_scene, pose_of, shipped_scene
+from ...configs.plan_scene import PlanScene, load_scene, pose_of, shipped_scene
 from ...configs.plan_scene_schema import UrdfRobot
 from ...planner.errors import BadConfig, BadShape, OneDemoError, PlanFailed, UnknownName
 from ...planner.geometry.pose import Pose, PosePath
@@ -17,13 +17,13 @@ from ...planner.judge.certify import Certificate, certify
 from ...planner.log.motion_log import write_log
 from ...planner.planning.plan import ACCELERATION, Plan
 from ...planner.planning.planner import Planner
-from ...planner.planning.planning_scene import SceneWork
+from ...planner.planning.planning_scene import PlanningScene
 from ...planner.planning.settings import PlanSettings
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
 from ...planner.safety.safety_layer import contact_masks
 from ..console import console, labeled
-from .scene_plan import Planned
+from .scene_plan import ScenePlan
 
 FOUND, NOT_FOUND, REFUSED = 0, 1, 3
 """Exit codes: REFUSED is a plan that the judge does not accept, which must never be."""
@@ -89,13 +89,13 @@ def scene_path(scene: str) -> Path:
     raise BadConfig(path, "", "no such file")
 
 
-def plan_in(scene: Scene) -> Planned:
+def plan_in(scene: PlanScene) -> ScenePlan:
     """Plan in a scene.
 
     Raises:
         BadConfig: the robot, the start, the settings or a name in the scene cannot be used.
     """
-    from ...baselines.factory import settings_from
+    from ...configs.dataclass_settings import settings_from
 
     settings = settings_from(PlanSettings, scene.config.settings, f"{scene.source}: settings")
     arm, body, home = _robot(scene)
@@ -114,10 +114,10 @@ def plan_in(scene: Scene) -> Planned:
         plan = planner.plan(
             scene.demonstrated, start, scene.goal, scene.obstacles, allowed=scene.allowed, seed=scene.config.seed
         )
-    return Planned(scene, arm, body, start, settings, plan)
+    return ScenePlan(scene, arm, body, start, settings, plan)
 
 
-def refined(planned: Planned, *, smooth: bool, timed: bool) -> Planned:
+def refined(planned: ScenePlan, *, smooth: bool, timed: bool) -> ScenePlan:
     """The plan made smooth, then timed, as is wanted; no plan where that does not stay clear."""
     plan = planned.plan
     if not plan.success:
@@ -130,7 +130,7 @@ def refined(planned: Planned, *, smooth: bool, timed: bool) -> Planned:
     return planned._replace(plan=plan)
 
 
-def _robot(scene: Scene) -> tuple[Arm, Body, np.ndarray]:
+def _robot(scene: PlanScene) -> tuple[Arm, Body, np.ndarray]:
     """Arm, body and usual joints of the scene's robot."""
     robot = scene.config.robot
     if isinstance(robot, UrdfRobot):
@@ -146,7 +146,7 @@ def _robot(scene: Scene) -> tuple[Arm, Body, np.ndarray]:
     return compiled.arms[0].arm, robot_body(robot), compiled.home[0]
 
 
-def _urdf_robot(scene: Scene, robot: UrdfRobot) -> tuple[Arm, Body, np.ndarray]:
+def _urdf_robot(scene: PlanScene, robot: UrdfRobot) -> tuple[Arm, Body, np.ndarray]:
     from ...planner.robot.body_readers import body_from_urdf
 
     with scene.blaming("robot"):
@@ -176,7 +176,7 @@ def _warm_up(planner: Planner, start: np.ndarray) -> None:
     planner.plan(PosePath(here.dq[None]), start, here, (far,))
 
 
-def _lines(planned: Planned, certificate: Certificate | None) -> Iterator[tuple[str, str, str]]:
+def _lines(planned: ScenePlan, certificate: Certificate | None) -> Iterator[tuple[str, str, str]]:
     """Label, style and text of every line for the terminal."""
     plan, name = planned.plan, planned.scene.name
     spent = f"in {_time(plan.seconds)}, {plan.tries} {'try' if plan.tries == 1 else 'tries'}"
@@ -184,7 +184,11 @@ def _lines(planned: Planned, certificate: Certificate | None) -> Iterator[tuple[
         yield "not found ", "red", f"{name}: {plan.why}; {spent}"
         if plan.tree is not None:
             kept = int((plan.tree.verdicts == 0).sum())
-            yield "looked at ", "", f"{len(plan.tree.poses)} nodes in the last escape tree, {kept} of them kept"
+            yield (
+                "looked at ",
+                "",
+                f"{len(plan.tree.poses)} nodes in the last escape tree, {kept} of them kept",
+            )
         return
     seconds = plan.dt * (len(plan.joints) - 1)
     yield "found     ", "green", f"{name}: {_how(plan)}, {spent}; the motion takes {seconds:.1f} s"
@@ -207,7 +211,7 @@ def _how(plan: Plan) -> str:
     return ", ".join((found, *plan.refined))
 
 
-def _pace(planned: Planned) -> str:
+def _pace(planned: ScenePlan) -> str:
     plan = planned.plan
     if "timed" in plan.refined:
         speeds = np.abs(np.diff(plan.joints, axis=0)) / plan.dt / planned.arm.velocity_limits
@@ -215,7 +219,7 @@ def _pace(planned: Planned) -> str:
     return f"safety layer at work in {plan.changed / max(len(plan.joints) - 1, 1):.0%}"
 
 
-def _clearance(planned: Planned, certificate: Certificate | None) -> str:
+def _clearance(planned: ScenePlan, certificate: Certificate | None) -> str:
     if not planned.scene.obstacles:
         return "nothing to touch"
     if certificate is not None:
@@ -223,9 +227,9 @@ def _clearance(planned: Planned, certificate: Certificate | None) -> str:
         kept = f"{1e3 * planned.settings.safety.distance:.0f} mm must be kept"
         return f"{1e3 * certificate.clearance:.1f} mm at the least ({closest}), between the ticks too; {kept}"
     scene = planned.scene
-    work = SceneWork.of(planned.arm, planned.body, scene.obstacles, planned.settings, scene.allowed)
-    room = min(work.room(q) for q in planned.plan.joints)
-    return f"{1e3 * room:.1f} mm more than must be kept, at the ticks"
+    work = PlanningScene.of(planned.arm, planned.body, scene.obstacles, planned.settings, scene.allowed)
+    slack = min(work.slack(q) for q in planned.plan.joints)
+    return f"{1e3 * slack:.1f} mm more than must be kept, at the ticks"
 
 
 def _time(seconds: float) -> str:

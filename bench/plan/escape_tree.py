@@ -10,7 +10,7 @@ import numpy as np
 
 from ...planner.escape.repet import EscapeTree
 from ...planner.geometry.pose import PosePath
-from ..drawing.convex_view import Solid, View, hidden_by
+from ..drawing.convex_view import ConvexSolid, DrawingView, hidden_by
 
 PLANE, KEPT, REJECTED = "#2f9e5b", "#7a7a7a", "#d9482b"
 PLANE_SIDE = 0.05
@@ -22,7 +22,13 @@ DIM = 0.34
 
 
 def paint_tree(
-    axes: Any, view: View, tree: EscapeTree, path: PosePath, solids: Sequence[Solid], *, every: bool = False
+    axes: Any,
+    view: DrawingView,
+    tree: EscapeTree,
+    path: PosePath,
+    solids: Sequence[ConvexSolid],
+    *,
+    every: bool = False,
 ) -> None:
     """Edges, kept and rejected, and the planes along the branch that came home, or every plane."""
     from matplotlib.collections import LineCollection, PolyCollection

@@ -16,10 +16,10 @@ from ...planner.imitation.tsia import final_path, guide_index, imitated_path
 from ...planner.judge.certify import Certificate
 from ...planner.robot.body import FRAME, RADIUS, A, B, Body
 from ...planner.robot.link_capsules import joint_frames
-from ..drawing.convex_view import Solid, View, back_to_front, ball_along, best_view, hidden_by, solid_of
+from ..drawing.convex_view import ConvexSolid, DrawingView, back_to_front, ball_along, best_view, hidden_by, solid_of
 from ..drawing.solids import arm_patch, floor_corners, paint_arm, paint_floor, paint_shells, paint_solid, scale_ends
 from .escape_tree import KEPT, PLANE, REJECTED, paint_tree
-from .scene_plan import Planned
+from .scene_plan import ScenePlan
 
 DEMONSTRATED, FINAL, FREE = "#1f4fd8", "#d81fb4", "#00a9c7"
 SHADOW = "#bdb6a8"
@@ -63,16 +63,16 @@ class Content(NamedTuple):
     final: np.ndarray
     executed: np.ndarray
     frames: tuple[Pose, Pose]
-    solids: list[Solid]
+    solids: list[ConvexSolid]
     shelled: list[bool]
-    arms: list[list[Solid]]
+    arms: list[list[ConvexSolid]]
     floor: float
     table: np.ndarray | None
 
 
 def draw_plan(
-    planned: Planned, certificate: Certificate | None, files: Sequence[Path], *, every_plane: bool = False
-) -> View:
+    planned: ScenePlan, certificate: Certificate | None, files: Sequence[Path], *, every_plane: bool = False
+) -> DrawingView:
     """Draw a plan into every file, with the planes of the branch taken or every one; returns the view chosen."""
     import matplotlib
 
@@ -109,7 +109,7 @@ def draw_plan(
     return view
 
 
-def content_of(planned: Planned) -> Content:
+def content_of(planned: ScenePlan) -> Content:
     """What is drawn of a plan."""
     plan, scene, arm = planned.plan, planned.scene, planned.arm
     imitated = imitated_path(scene.demonstrated, scene.goal)
@@ -140,7 +140,7 @@ def content_of(planned: Planned) -> Content:
     )
 
 
-def capsules_of(planned: Planned, q: np.ndarray) -> list[Solid]:
+def capsules_of(planned: ScenePlan, q: np.ndarray) -> list[ConvexSolid]:
     """The arm's capsules at joints q (dof,), in the world."""
     poses = [Pose.identity(), *joint_frames(planned.arm, q)]
     out = []
@@ -170,7 +170,7 @@ def room_of(content: Content) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def window_of(content: Content, view: View) -> tuple[np.ndarray, np.ndarray]:
+def window_of(content: Content, view: DrawingView) -> tuple[np.ndarray, np.ndarray]:
     """Corners (2,) [m] of what is seen: paths, frames, obstacles and the hand, with a border."""
     low, high = room_of(content)
     corners = floor_corners(low - BORDER, high + BORDER)
@@ -191,7 +191,7 @@ def _stretched(low: np.ndarray, high: np.ndarray, ratio: float) -> tuple[np.ndar
     return middle - 0.5 * wanted, middle + 0.5 * wanted
 
 
-def _paint(axes: Any, planned: Planned, content: Content, view: View, every_plane: bool) -> None:
+def _paint(axes: Any, planned: ScenePlan, content: Content, view: DrawingView, every_plane: bool) -> None:
     paint_floor(axes, view, *room_of(content))
     for posture, arm in enumerate(content.arms):
         paint_arm(axes, view, arm, posture)
@@ -217,7 +217,7 @@ def _paint(axes: Any, planned: Planned, content: Content, view: View, every_plan
         _paint_frame(axes, pose, label, view, lines)
 
 
-def _paint_line(axes: Any, points: np.ndarray, content: Content, view: View, **style: Any) -> None:
+def _paint_line(axes: Any, points: np.ndarray, content: Content, view: DrawingView, **style: Any) -> None:
     """A path, fainter where a solid is in front of it; below all paths a white border."""
     flat, middles = view.flat(points), 0.5 * (points[1:] + points[:-1])
     start = 0
@@ -230,7 +230,7 @@ def _paint_line(axes: Any, points: np.ndarray, content: Content, view: View, **s
         start += count
 
 
-def _paint_frame(axes: Any, pose: Pose, label: str, view: View, lines: np.ndarray) -> None:
+def _paint_frame(axes: Any, pose: Pose, label: str, view: DrawingView, lines: np.ndarray) -> None:
     """A triad and its name, which stands where it is farthest from the points (n, 2) of all lines."""
     from matplotlib.patheffects import Normal, Stroke
 
@@ -241,16 +241,16 @@ def _paint_frame(axes: Any, pose: Pose, label: str, view: View, lines: np.ndarra
         style = {"color": color, "linewidth": 2.4, "solid_capstyle": "round", "zorder": 35, "path_effects": halo}
         axes.plot(*np.stack([at, tip]).T, **style)
     axes.plot(*at, marker="o", markersize=5.5, color="0.1", markeredgecolor="white", markeredgewidth=0.9, zorder=36)
-    ways = np.array([[x, y] for x, y in ((0, 1), (1, 0.5), (-1, 0.5), (1, -0.6), (-1, -0.6), (0, -1))])
-    gaps = np.linalg.norm((at + LABEL * ways)[:, None] - lines, axis=2).min(axis=1)
-    way = ways[int(gaps.argmax())]
+    directions = np.array([[x, y] for x, y in ((0, 1), (1, 0.5), (-1, 0.5), (1, -0.6), (-1, -0.6), (0, -1))])
+    gaps = np.linalg.norm((at + LABEL * directions)[:, None] - lines, axis=2).min(axis=1)
+    direction = directions[int(gaps.argmax())]
     axes.text(
-        *(at + LABEL * way), label, ha="center", va="center", fontsize=11, color="0.1", zorder=37,
+        *(at + LABEL * direction), label, ha="center", va="center", fontsize=11, color="0.1", zorder=37,
         path_effects=[Stroke(linewidth=3.2, foreground="white"), Normal()],
     )  # fmt: skip
 
 
-def _legend(figure: Any, planned: Planned, content: Content) -> None:
+def _legend(figure: Any, planned: ScenePlan, content: Content) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -281,7 +281,7 @@ def _legend(figure: Any, planned: Planned, content: Content) -> None:
     )  # fmt: skip
 
 
-def _title(planned: Planned, certificate: Certificate | None) -> str:
+def _title(planned: ScenePlan, certificate: Certificate | None) -> str:
     plan, title = planned.plan, planned.scene.config.title or planned.scene.name
     if not plan.success:
         return f"{title}: {plan.reason}"
@@ -292,6 +292,6 @@ def _title(planned: Planned, certificate: Certificate | None) -> str:
     return f"{title}: {how}{kept}"
 
 
-def content_matters(planned: Planned) -> bool:
+def content_matters(planned: ScenePlan) -> bool:
     """Whether there is anything to keep clear of."""
     return bool(planned.scene.obstacles)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...configs.plan_scene import Scene
+from ...configs.plan_scene import PlanScene
 from ...planner.log.motion_log import MotionLog
 from ...planner.planning.plan import Plan
 from ...planner.planning.settings import PlanSettings
@@ -14,7 +14,7 @@ from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
 
 
-class Planned(NamedTuple):
+class ScenePlan(NamedTuple):
     """A scene, who moves in it, and the plan.
 
     Attributes:
@@ -26,7 +26,7 @@ class Planned(NamedTuple):
         plan: the answer.
     """
 
-    scene: Scene
+    scene: PlanScene
     arm: Arm
     body: Body
     start: np.ndarray

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...planner.collision.edge_certificates import tool_work
+from ...planner.collision.edge_certificates import tool_arrays
 from ...planner.escape import escape_tree
 from ...planner.escape.repet import EscapeTree, RepetSettings, escape_path
 from ...planner.geometry import screw
@@ -20,7 +20,7 @@ from ...planner.geometry.shapes import pack
 from ...planner.imitation.tsia import final_path, guide_index, imitated_path
 from ...planner.jit import kernel
 from ...planner.safety.safety_layer import contact_masks
-from .scene_plan import Planned
+from .scene_plan import ScenePlan
 
 LOOPS = 100
 """Planes that are laid in a compiled loop for one sample."""
@@ -61,7 +61,7 @@ def expand_loop(g, tree, goal, cells, options, state, repeats):
     return tree[1, 0]
 
 
-def timed_tree(planned: Planned, repeats: int) -> TreeTimes:
+def timed_tree(planned: ScenePlan, repeats: int) -> TreeTimes:
     """Measure the first tree of a scene with so many samples.
 
     Raises:
@@ -77,7 +77,7 @@ def timed_tree(planned: Planned, repeats: int) -> TreeTimes:
         raise ValueError(f"{scene.name}: the way is free")
     levels = levels_of(tree)
     detour = _milliseconds(lambda: escape_path(path, tool, scene.obstacles, settings, masks=masks), repeats)
-    g = tool_work(tool, pack(scene.obstacles), masks=masks, margin=settings.distance)
+    g = tool_arrays(tool, pack(scene.obstacles), masks=masks, margin=settings.distance)
     return TreeTimes(
         scene=scene.name,
         planes=len(tree.planes),
@@ -100,7 +100,7 @@ def _plane_ms(
     return mean / LOOPS, deviation / LOOPS
 
 
-def _nominal(planned: Planned) -> PosePath:
+def _nominal(planned: ScenePlan) -> PosePath:
     """The final path, which is blocked."""
     imitated = imitated_path(planned.scene.demonstrated, planned.scene.goal)
     guide = guide_index(imitated, planned.settings.motion.guide) if len(imitated) > 1 else 0

@@ -62,8 +62,8 @@ def failures(lines: list[Series]) -> Any:
         axes.text(1.02, middle, level, ha="left", va="center", fontweight="bold", clip_on=False)
     axes.set_yticks(places, [label for _, label, _ in rows])
     axes.set(xlim=(0.0, 1.0), ylim=(places[-1] + 0.6, places[0] - 0.6), xlabel="share of episodes")
-    room = 72.0 * (height - 0.55) / (places[-1] + 1.0)
-    axes.tick_params(axis="y", length=0, labelsize=min(7.5, 0.85 * room))
+    points_per_row = 72.0 * (height - 0.55) / (places[-1] + 1.0)
+    axes.tick_params(axis="y", length=0, labelsize=min(7.5, 0.85 * points_per_row))
     axes.grid(False)
     axes.spines["left"].set_visible(False)
     words = [entry[2] for entry in (*OUTCOMES.values(), OTHER) if entry[2] in used]

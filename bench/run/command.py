@@ -21,7 +21,7 @@ from .comparison import Comparison
 from .config_checks import check_grid
 from .episode_jobs import EpisodeJobs
 from .finish import film, report, show
-from .run_progress import Board
+from .run_progress import RunProgress
 
 SHIPPED_FOLDERS = (".", os.path.join("configs", "bench"))
 
@@ -60,7 +60,7 @@ def run_config(
         with ExitStack() as held:
             open_folder(folder, held, part.name)
             describe(grid, folder, shlex.join(["onedemo", "run", config, *overrides]))
-            return _completed(Comparison(grid, folder, Board(grid, err), part, retry=retry), err)
+            return _completed(Comparison(grid, folder, RunProgress(grid, err), part, retry=retry), err)
 
     return ended(work, folder, "finished episodes", quiet=quiet)
 

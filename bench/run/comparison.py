@@ -15,7 +15,7 @@ from ..episodes.run_folder import LOG, WHOLE, Shard, alone, recorded
 from ..episodes.scenarios import Suite, frozen, lists_of, read_suite, scenarios_of
 from ..workers.dispatcher import HUNG, WORKER_DIED, Answer, Executor, Job, Outcome, WorkerFailed
 from .episode_jobs import lost_record
-from .run_progress import Board
+from .run_progress import RunProgress
 
 DRAWN_AT_ONCE = 10
 """Scenarios of a drawing job."""
@@ -33,7 +33,7 @@ class Comparison:
         retry: run again what was lost with its worker.
     """
 
-    def __init__(self, grid: Grid, folder: Path, board: Board, shard: Shard = WHOLE, *, retry: bool = False):
+    def __init__(self, grid: Grid, folder: Path, board: RunProgress, shard: Shard = WHOLE, *, retry: bool = False):
         self.grid, self.folder, self.shard, self.board, self.retry = grid, folder, shard, board, retry
 
     def complete(self, executor: Executor) -> Records:

@@ -54,6 +54,7 @@ def known_names() -> dict[str, Iterable[str | None]]:
 
 
 def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterable[str | None]]) -> None:
+    """Refuse a name that is not among the known ones of its key; a policy of one's own is none of them."""
     if key == "method" and isinstance(value, str) and is_own(value):
         return
     if key in known and value not in list(known[key]):
@@ -111,7 +112,7 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
 
     file = demonstration_path(cell.demonstration)
     demonstration = load_demonstration(file)
-    task, segments = TASKS[cell.task].shown or cell.task, PROGRAMS[cell.task].SEGMENTS
+    task, segments = TASKS[cell.task].demonstrated_task or cell.task, PROGRAMS[cell.task].SEGMENTS
     if demonstration.task != task:
         raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
     names = [segment.name for segment in demonstration.segments]

@@ -172,7 +172,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRec
         ScenarioChanged: the environment draws another start than the frozen one.
         BadConfig: the start cannot be drawn.
     """
-    from ..episodes.episode import judged, play
+    from ..episodes.episode import episode_record, play
     from ..episodes.start_states import check_start, drawn_start
 
     scenario, started, checked = scenarios_of(config)[job["index"]], time.perf_counter(), False
@@ -195,7 +195,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRec
         detail = f"{type(error).__name__}: {error}"
         record = lost_record(config, scenario, ERROR, detail, time.perf_counter() - started)
     else:
-        record = judged(env, played, scenario, config, kept)
+        record = episode_record(env, played, scenario, config, kept)
     return replace(record, cell=config.digest(), scenario=job["scenario"])
 
 

@@ -13,7 +13,7 @@ from ..console import labeled
 from ..episodes.episode_records import EpisodeRecord
 
 
-class Board:
+class RunProgress:
     """Progress of a grid on a console.
 
     Args:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...baselines.extras import needed
-from ...baselines.learning.actor import Actor, Training
+from ...baselines.learning.actor import Actor, TrainingInfo
 from ...baselines.learning.actor_files import save_actor
 from ...baselines.learning.export_actor import actor_of
 from ...configs.train_config import TrainConfig
@@ -79,7 +79,7 @@ class Trainee:
     def actor(self) -> Actor:
         """What has been learned so far."""
         config, last = self.config, self.points[-1] if self.points else None
-        training = Training(
+        training = TrainingInfo(
             config.algorithm,
             steps=int(self.model.num_timesteps),
             seed=self.seed,

@@ -45,7 +45,7 @@ class Actor:
 
 
 @dataclass(eq=False)
-class Worker:
+class ActorWorker:
     """An actor.
 
     Attributes:
@@ -87,22 +87,22 @@ class RayActors:
             raise BadConfig("Ray", "address", f"no cluster at {address or 'this machine'}: {reason}") from None
         self._actor = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Actor)
 
-    def spawn(self) -> Worker:
+    def spawn(self) -> ActorWorker:
         """Start an actor."""
         actor = self._actor.remote(self._handler)
-        return Worker(actor, actor.process.remote())
+        return ActorWorker(actor, actor.process.remote())
 
-    def ask(self, worker: Worker, job: Job) -> None:
+    def ask(self, worker: ActorWorker, job: Job) -> None:
         """Send a job."""
         worker.answer = worker.actor.do.remote(job)
 
-    def poll(self, workers: Sequence[Worker], seconds: float) -> list[tuple[Any, Answer | None]]:
+    def poll(self, workers: Sequence[ActorWorker], seconds: float) -> list[tuple[Any, Answer | None]]:
         """The workers that have answered or died, within some seconds."""
         promises = {worker.answer: worker for worker in workers}
         ready, _ = self._ray.wait(list(promises), num_returns=1, timeout=seconds)
         return [(promises[promise], self._answer(promise)) for promise in ready]
 
-    def end(self, worker: Worker) -> None:
+    def end(self, worker: ActorWorker) -> None:
         """Kill an actor; on this machine its process too, which hears nothing while it is stopped."""
         process = None
         if self._local:

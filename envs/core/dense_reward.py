@@ -44,16 +44,16 @@ def placing(reach, distance, angle, held, done, away):
     return 0.1 * near(reach) + 0.05 * closeness(distance, angle)
 
 
-def tilting(way, tilt, held, poured):
+def tilting(distance, tilt, held, poured):
     """Reward in [0, 1] for one glass that is to be emptied into another.
 
     Args:
-        way: horizontal distance of the rims' middles beyond which nothing falls in [m]; 0 where it does.
+        distance: horizontal distance of the rims' middles beyond which nothing falls in [m]; 0 where it does.
         tilt: share of the pouring tilt, in [0, 1].
         held: the glass is in the hand.
         poured: share of the beads in the other glass.
     """
     if not held:
         return 0.5 * poured
-    there = near(way)
+    there = near(distance)
     return 0.1 + 0.2 * there + 0.2 * there * tilt + 0.5 * poured

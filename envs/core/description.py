@@ -10,7 +10,7 @@ from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Obstacle, Shape
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
-from ..scene.scene_objects import Book, Furniture, Glass, Solid, extents
+from ..scene.scene_objects import Book, FreeBody, Furniture, Glass, extents
 
 FAILURES = (
     "ik_or_limit",
@@ -41,7 +41,7 @@ class TaskObject:
     yaw_symmetry: float
 
     @staticmethod
-    def of(thing: Solid | Glass | Book) -> TaskObject:
+    def of(thing: FreeBody | Glass | Book) -> TaskObject:
         """What a policy may know of a thing."""
         return TaskObject(thing.name, thing.shape, thing.yaw_symmetry)
 

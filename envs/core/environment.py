@@ -12,11 +12,11 @@ import numpy as np
 
 from ...planner.errors import BadAction, BadOption, NoRoom, UnknownName
 from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Obstacle as Solid
+from ...planner.geometry.shapes import Obstacle as FreeBody
 from ..scene.robot_description import robot_parts
 from ..scene.scene import OBSTACLE
-from ..scene.scene_objects import TABLE_HEIGHT, Things
-from ..simulation.moving_obstacles import Intruder
+from ..scene.scene_objects import TABLE_HEIGHT, SceneSpec
+from ..simulation.moving_obstacles import ScheduledObstacle
 from ..simulation.render import TABLE_VIEW, Ghost, Renderer, View
 from ..simulation.simulation import PHYSICS_DT, Simulation, Start
 from ..simulation.state import State
@@ -24,7 +24,7 @@ from ..simulation.twist_control import TwistDrive
 from . import spaces as space
 from .description import TaskDescription, TaskFurniture, TaskObject
 from .levels import checked_obstacles, level_named
-from .obstacle_placement import Leg, Order, Stage, placed
+from .obstacle_placement import ObstacleRequest, PlacementContext, PlacementMotion, placed
 from .progress import Progress
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
@@ -35,7 +35,7 @@ SLOTS = 3
 MAX_LAYOUTS = 40
 """Starts that are drawn before a place for the obstacles must have been found."""
 Observation = dict[str, np.ndarray]
-Judged = TypeVar("Judged", bound=Progress)
+ProgressT = TypeVar("ProgressT", bound=Progress)
 """What keeps the progress of a task."""
 
 
@@ -50,7 +50,7 @@ def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
     return value
 
 
-class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
+class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
     """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator.
 
     Args:
@@ -65,7 +65,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
     """
 
     _goal_pose: np.ndarray
-    _progress: Judged
+    _progress: ProgressT
 
     metadata = METADATA
 
@@ -74,7 +74,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         *,
         name: str,
         robot: str,
-        things: Things,
+        things: SceneSpec,
         goals: int,
         motions: int,
         level: str,
@@ -111,7 +111,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
             self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
         )
 
-    def _described(self, name: str, robot: str, things: Things) -> TaskDescription:
+    def _described(self, name: str, robot: str, things: SceneSpec) -> TaskDescription:
         parts = robot_parts(robot, self.sim.scene)
         return TaskDescription(
             name=name,
@@ -150,14 +150,14 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         """
 
     @abstractmethod
-    def _legs(self, start: Start) -> list[Leg]:
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
         """The motions of the hand that obstacles are put in the way of, in order."""
 
     def _ghosts(self) -> list[Ghost]:
         """What is drawn but not there: the goals, if they are places of objects."""
         return []
 
-    def _paper(self, legs: list[Leg]) -> list[Order]:
+    def _paper(self, legs: list[PlacementMotion]) -> list[ObstacleRequest]:
         """The paper's obstacles."""
         raise BadOption("obstacles", f"the paper shows no obstacle in {self.task.name}")
 
@@ -181,30 +181,30 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
         self._refused = 0
         for _ in range(MAX_LAYOUTS):
             start = self._start(dict(options), level.layout, isinstance(wanted, str) and wanted != "none")
-            intruders = wanted if isinstance(wanted, tuple) else self._intruders(wanted, start)
-            if intruders is not None:
-                return start._replace(intruders=intruders)
+            scheduled_obstacles = wanted if isinstance(wanted, tuple) else self._scheduled_obstacles(wanted, start)
+            if scheduled_obstacles is not None:
+                return start._replace(scheduled_obstacles=scheduled_obstacles)
             self._refused += 1
         raise NoRoom(wanted)
 
-    def _intruders(self, kind: str, start: Start) -> tuple[Intruder, ...] | None:
+    def _scheduled_obstacles(self, kind: str, start: Start) -> tuple[ScheduledObstacle, ...] | None:
         if kind == "none":
             return ()
-        task, legs = self.task, self._legs(start)
+        task, legs = self.task, self._placement_motions(start)
         things = []
         for each, pose in zip(task.objects, start.objects, strict=True):
-            things.append(Solid(each.shape, Pose.from_vector(pose), name=each.name))
+            things.append(FreeBody(each.shape, Pose.from_vector(pose), name=each.name))
         for each, pose in zip(task.furniture, start.furniture, strict=True):
             things += each.at(Pose.from_vector(pose))
         solids = [*task.fixtures, *things]
-        stage = Stage(legs, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height)
+        stage = PlacementContext(legs, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height)
         return placed(self.np_random, kind, stage, self._paper(legs) if kind == "paper" else None)
 
     def _reached(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """What Gymnasium wants to know of the state that the simulation is in."""
         state = self.sim.read()
         reward, terminated, info = self._judge(state)
-        if self.sim.obstacles.intruders:
+        if self.sim.obstacles.scheduled_obstacles:
             touching = state.touching
             self._contacts += bool(touching[OBSTACLE].any() or touching[:, OBSTACLE].any())
         info["n_contacts"], info["min_obstacle_distance"] = self._contacts, self.sim.nearest_obstacle()
@@ -229,7 +229,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[Judged]):
             BadAction: not an array of real numbers, of the wrong shape, or not finite.
         """
         self._take(action)
-        if self.sim.obstacles.intruders:
+        if self.sim.obstacles.scheduled_obstacles:
             self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self._progress.motion_index)
         if self.control_mode == "joint_velocity":
             bad = self.sim.step(self._action, self._speed_limits, 1.0, self.substeps)

@@ -25,9 +25,9 @@ def holding_joints(arm: Arm, hands: Sequence[Pose], seed: np.ndarray) -> np.ndar
     return min(possible, key=lambda q: float(np.abs(q - seed).max())) if possible else None
 
 
-def can_follow(arm: Arm, q: np.ndarray, way: Sequence[Pose]) -> bool:
+def can_follow(arm: Arm, q: np.ndarray, poses: Sequence[Pose]) -> bool:
     """Whether the arm can go from joints q (dof,) from pose to pose of a way without changing its posture."""
-    for pose in way:
+    for pose in poses:
         reached = inverse_kinematics(arm, pose, q)
         if reached is None or arm.margin(reached) < MARGIN or np.abs(reached - q).max() > SAME_POSTURE:
             return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...planner.errors import BadOption, UnknownName
-from ..simulation.moving_obstacles import Intruder
+from ..simulation.moving_obstacles import ScheduledObstacle
 
 OBSTACLES = ("none", "static", "appear", "moving", "unforeseen", "forearm", "paper")
 """Kinds: still ones on the way of the hand; one that appears in the middle of a motion; one that swings across the
@@ -51,7 +51,7 @@ def level_named(name: object) -> Level:
     return LEVELS[name]
 
 
-def checked_obstacles(value: object, slots: int) -> str | tuple[Intruder, ...]:
+def checked_obstacles(value: object, slots: int) -> str | tuple[ScheduledObstacle, ...]:
     """A kind of obstacles, or obstacles themselves.
 
     Raises:
@@ -62,7 +62,7 @@ def checked_obstacles(value: object, slots: int) -> str | tuple[Intruder, ...]:
         if value not in OBSTACLES:
             raise UnknownName("obstacles", value, OBSTACLES)
         return value
-    if not isinstance(value, tuple | list) or not all(isinstance(each, Intruder) for each in value):
+    if not isinstance(value, tuple | list) or not all(isinstance(each, ScheduledObstacle) for each in value):
         raise BadOption("obstacles", f"{value!r} is neither one of {', '.join(OBSTACLES)} nor a list of Intruder")
     if len(value) > slots:
         raise BadOption("obstacles", f"there are {len(value)}; at most {slots} are possible")

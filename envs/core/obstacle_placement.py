@@ -20,10 +20,17 @@ from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box, Capsule, Obstacle, Packed, Shape, Sphere, pack
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import Body
-from ..scene.body_clearance import arm_room, capsule_ends, point_room, tool_room
-from ..simulation.moving_obstacles import Intruder
+from ..scene.body_clearance import arm_clearance, capsule_ends, point_clearance, tool_clearance
+from ..simulation.moving_obstacles import ScheduledObstacle
 
-START_ROOM, KEY_ROOM, SWING_ROOM, POSTURE_ROOM, SOLID_ROOM, FLOOR_ROOM = 0.05, 0.03, 0.02, 0.02, 0.02, 0.03
+START_CLEARANCE, KEY_CLEARANCE, SWING_CLEARANCE, POSTURE_CLEARANCE, SOLID_CLEARANCE, FLOOR_CLEARANCE = (
+    0.05,
+    0.03,
+    0.02,
+    0.02,
+    0.02,
+    0.03,
+)
 """Least room [m]: of the arm at the start; of the hand at key poses, beside a swinging one; of the arm's posture there;
 of objects and furniture; above the table."""
 SEEDS = 24
@@ -44,7 +51,7 @@ PHASES = np.arange(5) * 2.0 * np.pi / 5.0
 
 
 @dataclass(frozen=True)
-class Leg:
+class PlacementMotion:
     """A motion of the hand that obstacles are put in the way of.
 
     Attributes:
@@ -75,7 +82,7 @@ class Leg:
         return sclerp(self.start.dq, self.end.dq, np.linspace(0.0, 1.0, SWEEP))
 
 
-class Order(NamedTuple):
+class ObstacleRequest(NamedTuple):
     """An obstacle that is wanted.
 
     Attributes:
@@ -89,7 +96,7 @@ class Order(NamedTuple):
     size: float | None = None
 
 
-class Stage:
+class PlacementContext:
     """What obstacles are placed into.
 
     Args:
@@ -104,7 +111,7 @@ class Stage:
 
     def __init__(
         self,
-        legs: list[Leg],
+        legs: list[PlacementMotion],
         arm: Arm,
         body: Body,
         joints: np.ndarray,
@@ -119,29 +126,33 @@ class Stage:
         self._key_poses = [np.array([pose.dq for key in leg.keys for pose in key]) for leg in legs]
         self._postures: dict[int, list[list[np.ndarray]]] = {}
 
-    def has_room(self, places: Packed, room: float) -> bool:
+    def has_room(self, places: Packed, clearance: float) -> bool:
         """Whether the start, the key poses, the solids and the table keep their distance to an obstacle's places."""
         for row in places.rows:
             center, ball = row[2:5], row[20]
-            if center[2] - ball < self.floor + FLOOR_ROOM or point_room(center, self._solids) - ball < SOLID_ROOM:
+            if (
+                center[2] - ball < self.floor + FLOOR_CLEARANCE
+                or point_clearance(center, self._solids) - ball < SOLID_CLEARANCE
+            ):
                 return False
-        if arm_room(self.arm, self.body, self.joints, places) < START_ROOM:
+        if arm_clearance(self.arm, self.body, self.joints, places) < START_CLEARANCE:
             return False
         return all(
-            tool_room(tool, poses, places) >= room for tool, poses in zip(self.tools, self._key_poses, strict=True)
+            tool_clearance(tool, poses, places) >= clearance
+            for tool, poses in zip(self.tools, self._key_poses, strict=True)
         )
 
     def has_postures(self, places: Packed) -> bool:
         """Whether at each key pose, and along what is straight, the arm has a posture clear of all these obstacles."""
         return all(
             any(
-                all(arm_room(self.arm, self.body, q, places) >= POSTURE_ROOM for q in postures)
+                all(arm_clearance(self.arm, self.body, q, places) >= POSTURE_CLEARANCE for q in postures)
                 for postures in self._postures_at(index)
             )
             for index in range(len(self._keys))
         )
 
-    def nominal(self, leg: Leg) -> list[np.ndarray]:
+    def nominal(self, leg: PlacementMotion) -> list[np.ndarray]:
         """Postures (dof,) of the arm along a leg, each near the one before; none where it cannot follow."""
         q, found = self.joints, []
         for row in leg.sweep[::2]:
@@ -169,13 +180,13 @@ class Stage:
             if q is None or (found and np.abs(q - found[-1]).max() > NEAR):
                 return []
             # what moves with the last joint may be near what it takes and where it puts it
-            if arm_room(self.arm, self.body, q, self._things, range(0, self.arm.dof - 1)) < 0.0:
+            if arm_clearance(self.arm, self.body, q, self._things, range(0, self.arm.dof - 1)) < 0.0:
                 return []
             found.append(q)
         return found
 
 
-def _alternatives(leg: Leg) -> Iterator[tuple[tuple[Pose, ...], ...]]:
+def _alternatives(leg: PlacementMotion) -> Iterator[tuple[tuple[Pose, ...], ...]]:
     """Key by key the lines to follow, one for each of its symmetric alternatives; what is straight is one line."""
     single = len(leg.keys) - leg.straight
     for key in leg.keys[:single]:
@@ -184,8 +195,8 @@ def _alternatives(leg: Leg) -> Iterator[tuple[tuple[Pose, ...], ...]]:
 
 
 def placed(
-    rng: np.random.Generator, kind: str, stage: Stage, wanted: list[Order] | None = None
-) -> tuple[Intruder, ...] | None:
+    rng: np.random.Generator, kind: str, stage: PlacementContext, wanted: list[ObstacleRequest] | None = None
+) -> tuple[ScheduledObstacle, ...] | None:
     """Obstacles of a kind for a stage, or None where there is no room for them.
 
     Args:
@@ -197,8 +208,8 @@ def placed(
     if kind == "unforeseen":
         kind = ("moving", "appear")[rng.integers(2)]
     count = int(rng.integers(1, 4)) if kind == "static" else 1
-    orders = wanted or [Order(kind, int(leg)) for leg in rng.permutation(len(stage.legs))[:count]]
-    found: list[Intruder] = []
+    orders = wanted or [ObstacleRequest(kind, int(leg)) for leg in rng.permutation(len(stage.legs))[:count]]
+    found: list[ScheduledObstacle] = []
     for order in orders:
         one = _placed_one(rng, order, stage, found)
         if one is None:
@@ -207,7 +218,9 @@ def placed(
     return tuple(found)
 
 
-def _placed_one(rng: np.random.Generator, order: Order, stage: Stage, others: list[Intruder]) -> Intruder | None:
+def _placed_one(
+    rng: np.random.Generator, order: ObstacleRequest, stage: PlacementContext, others: list[ScheduledObstacle]
+) -> ScheduledObstacle | None:
     make = {"static": _still, "appear": _appearing, "moving": _swinging, "forearm": _at_forearm}[order.kind]
     for _ in range(TRIES):
         one = make(rng, stage, order.leg, order.size)
@@ -216,24 +229,24 @@ def _placed_one(rng: np.random.Generator, order: Order, stage: Stage, others: li
     return None
 
 
-def _fits(stage: Stage, one: Intruder, kind: str, others: list[Intruder]) -> bool:
+def _fits(stage: PlacementContext, one: ScheduledObstacle, kind: str, others: list[ScheduledObstacle]) -> bool:
     times = (PHASES - one.phase) / one.frequency if one.frequency else np.zeros(1)
     places = pack([Obstacle(one.shape, one.pose(time)) for time in times])
     leg, tool = stage.legs[one.leg], stage.tools[one.leg]
-    near = tool_room(tool, leg.sweep, places)
-    if (near < KEY_ROOM) if kind == "forearm" else (near >= 0.0):
+    near = tool_clearance(tool, leg.sweep, places)
+    if (near < KEY_CLEARANCE) if kind == "forearm" else (near >= 0.0):
         return False
     # what appears is not there at the start; that it has room then is seen to when it does
-    room = SWING_ROOM if one.frequency else KEY_ROOM
-    if not stage.has_room(places, room):
+    clearance = SWING_CLEARANCE if one.frequency else KEY_CLEARANCE
+    if not stage.has_room(places, clearance):
         return False
     # postures must be clear of all that stand still together
     still = [Obstacle(each.shape, each.pose(0.0)) for each in (*others, one) if not each.frequency]
     return bool(one.frequency) or stage.has_postures(pack(still))
 
 
-def _apart(one: Intruder, others: list[Intruder]) -> bool:
-    return all(np.linalg.norm(np.subtract(one.center, each.center)) > LARGEST + SOLID_ROOM for each in others)
+def _apart(one: ScheduledObstacle, others: list[ScheduledObstacle]) -> bool:
+    return all(np.linalg.norm(np.subtract(one.center, each.center)) > LARGEST + SOLID_CLEARANCE for each in others)
 
 
 def _shape(rng: np.random.Generator, size: float | None) -> tuple[Shape, tuple[float, ...]]:
@@ -250,41 +263,43 @@ def _shape(rng: np.random.Generator, size: float | None) -> tuple[Shape, tuple[f
     return Capsule(radius, max(z - 2.0 * radius, 0.01)), rotation
 
 
-def _center(rng: np.random.Generator, leg: Leg, low: float, high: float) -> np.ndarray:
+def _center(rng: np.random.Generator, leg: PlacementMotion, low: float, high: float) -> np.ndarray:
     """A point (3,) near the straight way of the hand."""
     a, b = leg.start.position, leg.end.position
-    way = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
-    side = np.array([-way[1], way[0], 0.0])
+    direction = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
+    side = np.array([-direction[1], direction[0], 0.0])
     middle = a + rng.uniform(low, high) * (b - a)
     return middle + rng.uniform(-leg.aside, leg.aside) * side + np.array([0, 0, rng.uniform(-leg.above, leg.above)])
 
 
-def _still(rng: np.random.Generator, stage: Stage, leg: int, size: float | None) -> Intruder:
+def _still(rng: np.random.Generator, stage: PlacementContext, leg: int, size: float | None) -> ScheduledObstacle:
     shape, rotation = _shape(rng, size)
-    return Intruder(shape, _tuple(_center(rng, stage.legs[leg], 0.3, 0.7)), rotation, leg=leg)
+    return ScheduledObstacle(shape, _tuple(_center(rng, stage.legs[leg], 0.3, 0.7)), rotation, leg=leg)
 
 
-def _appearing(rng: np.random.Generator, stage: Stage, leg: int, size: float | None) -> Intruder:
+def _appearing(rng: np.random.Generator, stage: PlacementContext, leg: int, size: float | None) -> ScheduledObstacle:
     shape, rotation = _shape(rng, size)
     center = _tuple(_center(rng, stage.legs[leg], 0.4, 0.7))
     delay = float(rng.uniform(0.5, 2.0))
-    return Intruder(shape, center, rotation, motion=stage.legs[leg].motion, delay=delay, leg=leg)
+    return ScheduledObstacle(shape, center, rotation, motion=stage.legs[leg].motion, delay=delay, leg=leg)
 
 
-def _swinging(rng: np.random.Generator, stage: Stage, leg: int, speed: float | None) -> Intruder:
+def _swinging(rng: np.random.Generator, stage: PlacementContext, leg: int, speed: float | None) -> ScheduledObstacle:
     shape, rotation = _shape(rng, None)
-    way = stage.legs[leg].end.position - stage.legs[leg].start.position
-    heading = np.arctan2(way[1], way[0]) + 0.5 * np.pi + rng.uniform(-0.5, 0.5)
+    direction = stage.legs[leg].end.position - stage.legs[leg].start.position
+    heading = np.arctan2(direction[1], direction[0]) + 0.5 * np.pi + rng.uniform(-0.5, 0.5)
     amplitude = rng.uniform(*SWING)
     long = amplitude * np.array([np.cos(heading), np.sin(heading), rng.uniform(-0.3, 0.3)])
     short = rng.uniform(0.0, 0.3) * amplitude * np.array([-np.sin(heading), np.cos(heading), 0.0])
     peak = rng.uniform(SLOWEST, FASTEST) if speed is None else speed
     center = _tuple(_center(rng, stage.legs[leg], 0.35, 0.65))
     frequency, phase = peak / float(np.linalg.norm(long)), float(rng.uniform(0.0, 2.0 * np.pi))
-    return Intruder(shape, center, rotation, _tuple(long), _tuple(short), frequency, phase, leg=leg)
+    return ScheduledObstacle(shape, center, rotation, _tuple(long), _tuple(short), frequency, phase, leg=leg)
 
 
-def _at_forearm(rng: np.random.Generator, stage: Stage, leg: int, size: float | None) -> Intruder | None:
+def _at_forearm(
+    rng: np.random.Generator, stage: PlacementContext, leg: int, size: float | None
+) -> ScheduledObstacle | None:
     """A still body where a link between elbow and wrist passes."""
     postures = stage.nominal(stage.legs[leg])
     links = range(stage.arm.dof - 4, stage.arm.dof - 2)
@@ -295,8 +310,8 @@ def _at_forearm(rng: np.random.Generator, stage: Stage, leg: int, size: float | 
     a, b = ends[int(rng.integers(len(ends)))]
     point = a + rng.uniform() * (b - a) + rng.uniform(-0.03, 0.03, 3)
     place = pack([Obstacle(shape, Pose.from_position_quaternion(point, rotation))])
-    hit = min(arm_room(stage.arm, stage.body, q, place, links) for q in postures)
-    return Intruder(shape, _tuple(point), rotation, leg=leg) if hit < 0.0 else None
+    hit = min(arm_clearance(stage.arm, stage.body, q, place, links) for q in postures)
+    return ScheduledObstacle(shape, _tuple(point), rotation, leg=leg) if hit < 0.0 else None
 
 
 def _tuple(vector: np.ndarray) -> tuple[float, float, float]:

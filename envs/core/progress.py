@@ -80,7 +80,7 @@ class Progress(ABC):
         """The dense reward in [0, 1] of the state taken in last."""
 
     @abstractmethod
-    def numbers(self) -> dict[str, Any]:
+    def task_info(self) -> dict[str, Any]:
         """The task's own entries of `info`."""
 
     def info(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class Progress(ABC):
             "stage": self.stage,
             "failure_reason": self.failure,
             "collision": self.collision,
-            **self.numbers(),
+            **self.task_info(),
         }
 
     def _settle(self, settled: bool, verdict: Contacts) -> None:

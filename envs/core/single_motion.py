@@ -13,7 +13,7 @@ from gymnasium.spaces.utils import flatten, flatten_space
 from ...planner.errors import BadOption
 from ..simulation.state import State
 from . import spaces as space
-from .environment import Judged, Observation, OneDemoEnv
+from .environment import Observation, OneDemoEnv, ProgressT
 from .levels import level_named
 
 FREQUENCY = 20
@@ -37,7 +37,7 @@ class Agreement(NamedTuple):
     reached: np.ndarray
 
 
-class SubTask(OneDemoEnv[Judged]):
+class SubTask(OneDemoEnv[ProgressT]):
     """A task of one object; see the tasks' own docstrings."""
 
     GOAL_BOUNDS: tuple[float, ...]

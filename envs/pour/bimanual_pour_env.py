@@ -13,12 +13,12 @@ from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import pack
 from ..core import spaces as space
 from ..core.environment import OneDemoEnv
-from ..core.obstacle_placement import Leg
+from ..core.obstacle_placement import PlacementMotion
 from ..core.reset_options import check_known, checked_joints
 from ..scene.beads import poured_into
-from ..scene.body_clearance import arm_room
+from ..scene.body_clearance import arm_clearance
 from ..scene.robots import robot_named
-from ..scene.scene_objects import Beads, Glass, Things
+from ..scene.scene_objects import Beads, Glass, SceneSpec
 from ..simulation.render import View
 from ..simulation.simulation import Start
 from ..simulation.state import State
@@ -41,7 +41,7 @@ PLACES = ((0.14, -0.22, 1.22), (0.22, 0.16, 1.18))
 YAWS = np.deg2rad((60.0, -60.0))
 """Nominal directions [rad] of the level hands."""
 OPTIONS = ("level", "obstacles", "joint_positions")
-ROOM, MARGIN = 0.03, 0.1
+CLEARANCE, MARGIN = 0.03, 0.1
 """Least distance [m] of an arm at the start to what stands there, and to its joints' limits [rad]."""
 APART = 0.22
 """Least distance of the glasses' axes at the start [m]: two hands have room."""
@@ -50,7 +50,7 @@ VIEW = View((0.0, 0.0, 1.1), 2.0, 160.0, -15.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Ranges:
+class BimanualPourRanges:
     """How far a start may differ: shift of a glass in x, y and z [m], turn of a hand [rad], change of a joint [rad]."""
 
     place: float
@@ -59,9 +59,9 @@ class Ranges:
 
 
 RANGES = {
-    "L0": Ranges(0.0, 0.0, 0.0),
-    "L1": Ranges(0.05, np.deg2rad(15.0), 0.05),
-    "L2": Ranges(0.15, np.deg2rad(60.0), 0.15),
+    "L0": BimanualPourRanges(0.0, 0.0, 0.0),
+    "L1": BimanualPourRanges(0.05, np.deg2rad(15.0), 0.05),
+    "L2": BimanualPourRanges(0.15, np.deg2rad(60.0), 0.15),
 }
 """By the name of a layout, see `levels`; what the arms cannot reach is drawn anew."""
 
@@ -134,7 +134,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
     `robot="Baxter"`, `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" |
     "moving" | "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
     `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`,
-    `obstacles` (a kind, or a list of `Intruder`) and `joint_positions` (2, 7), which hold the glasses upright.
+    `obstacles` (a kind, or a list of `ScheduledObstacle`) and `joint_positions` (2, 7), which hold the glasses upright.
 
     ## Version History
     * v0: first version.
@@ -158,7 +158,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         super().__init__(
             name="bimanual_pour",
             robot=robot,
-            things=Things(GLASSES, (), BEADS),
+            things=SceneSpec(GLASSES, (), BEADS),
             goals=1,
             motions=2,
             level=level,
@@ -200,7 +200,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         beads = poured_into(glasses[SOURCE], GLASSES[SOURCE], BEADS)
         return Start(joints, glasses, beads=beads, grips=np.array([2.0 * glass.radius for glass in GLASSES]))
 
-    def _drawn(self, ranges: Ranges) -> np.ndarray:
+    def _drawn(self, ranges: BimanualPourRanges) -> np.ndarray:
         """Start joints (2, dof) by rejection: a rule on reach, whatever the method."""
         rng = self.np_random
         for _ in range(MAX_STARTS):
@@ -222,16 +222,18 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         q = inverse_kinematics(arm, hand, seed)
         if q is None or arm.margin(q) < MARGIN:
             return None
-        room = arm_room(arm, self._task.bodies[k], q, self._solids, range(1, arm.dof))
-        return q if room >= ROOM else None
+        clearance = arm_clearance(arm, self._task.bodies[k], q, self._solids, range(1, arm.dof))
+        return q if clearance >= CLEARANCE else None
 
-    def _legs(self, start: Start) -> list[Leg]:
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
         """The way of the source to where the target is."""
         hand = self.arms[0].fk(start.joints[0])
         above = Pose.from_position_quaternion(self._goal_pose[0, :3] + [0.0, 0.0, 0.5 * GLASSES[SOURCE].height])
         turned = Pose.from_position_quaternion([0, 0, 0], hand.quaternion)
         before = above @ turned @ Pose.from_position_quaternion([0.0, 0.0, -0.1])
-        return [Leg(hand, before, ((hand,), (before,)), GLASSES[SOURCE].shape, tcp_from_glass(SOURCE), motion=1)]
+        return [
+            PlacementMotion(hand, before, ((hand,), (before,)), GLASSES[SOURCE].shape, tcp_from_glass(SOURCE), motion=1)
+        ]
 
     def _more_observed(self, state: State) -> dict[str, np.ndarray]:
         return {"bead_fraction": self._progress.fractions}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Cylinder
-from ..scene.scene_objects import Beads, Color, Furniture, Glass, Part
+from ..scene.scene_objects import Beads, Color, FixedShape, Furniture, Glass
 
 SOURCE, TARGET = 0, 1
 """Indices of the two glasses."""
@@ -35,9 +35,9 @@ TILTED = np.deg2rad(115.0)
 
 def stand(name: str) -> Furniture:
     """What a glass stands on; its frame is in the middle of its top."""
-    plate = Part(Cylinder(PLATE_RADIUS, PLATE), (0.0, 0.0, -0.5 * PLATE, 1.0, 0.0, 0.0, 0.0), WOOD)
+    plate = FixedShape(Cylinder(PLATE_RADIUS, PLATE), (0.0, 0.0, -0.5 * PLATE, 1.0, 0.0, 0.0, 0.0), WOOD)
     middle = (0.0, 0.0, -PLATE - 0.5 * COLUMN, 1.0, 0.0, 0.0, 0.0)
-    return Furniture(f"{name}_stand", (plate, Part(Cylinder(COLUMN_RADIUS, COLUMN), middle, METAL)))
+    return Furniture(f"{name}_stand", (plate, FixedShape(Cylinder(COLUMN_RADIUS, COLUMN), middle, METAL)))
 
 
 STANDS = tuple(stand(glass.name) for glass in GLASSES)

@@ -25,7 +25,7 @@ MAX_TRIES = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class Ranges:
+class PourRanges:
     """How far a start may differ from the nominal one.
 
     Attributes:
@@ -42,16 +42,16 @@ class Ranges:
 
 
 RANGES = {
-    "L0": Ranges(0.0, 0.0, (0.0, 0.0), 0.0),
-    "L1": Ranges(0.05, 0.10, (0.0, 0.0), 0.05),
-    "L2": Ranges(0.15, 0.20, (-0.05, 0.15), 0.15),
+    "L0": PourRanges(0.0, 0.0, (0.0, 0.0), 0.0),
+    "L1": PourRanges(0.05, 0.10, (0.0, 0.0), 0.05),
+    "L2": PourRanges(0.15, 0.20, (-0.05, 0.15), 0.15),
 }
 """By the name of a layout, see `levels`. A round glass looks the same from everywhere: there is no yaw to draw."""
 
 
 def pour_layout(
     rng: np.random.Generator,
-    ranges: Ranges,
+    ranges: PourRanges,
     nominal: np.ndarray,
     arm_axis: np.ndarray,
     gap: float,

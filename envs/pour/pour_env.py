@@ -12,12 +12,12 @@ from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Obstacle, pack
 from ..core import spaces as space
 from ..core.environment import OneDemoEnv
-from ..core.obstacle_placement import Leg
+from ..core.obstacle_placement import PlacementMotion
 from ..core.reset_options import check_known, checked_joints
 from ..scene.beads import poured_into
-from ..scene.body_clearance import arm_room
+from ..scene.body_clearance import arm_clearance
 from ..scene.robots import places_of, robot_named
-from ..scene.scene_objects import Things
+from ..scene.scene_objects import SceneSpec
 from ..simulation.render import View
 from ..simulation.simulation import Start
 from ..simulation.state import State
@@ -29,7 +29,7 @@ from .rules import PourProgress
 OPTIONS = ("level", "obstacles", "stands", "joint_positions")
 RAISED, ABOVE = 0.12, (0.0, 0.04, 0.08)
 """Heights [m] above the grasp: of a leg's beginning, and at which the hand must find room beside obstacles."""
-START_ROOM = 0.03
+START_CLEARANCE = 0.03
 """Least distance [m] of the arm at the start to the glasses and stands that it does not hold."""
 TURNS = np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0))
 """By how much a hand that holds the source from the start may be turned from the ready one, the first that fits."""
@@ -113,7 +113,7 @@ class PourEnv(OneDemoEnv[PourProgress]):
     joints [rad], `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" |
     "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
     `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles`
-    (a kind, or a list of `Intruder`), `stands` (2, 3) exact tops of the stands, and `joint_positions` (7,).
+    (a kind, or a list of `ScheduledObstacle`), `stands` (2, 3) exact tops of the stands, and `joint_positions` (7,).
 
     ## Version History
     * v0: first version.
@@ -140,7 +140,7 @@ class PourEnv(OneDemoEnv[PourProgress]):
         super().__init__(
             name="pour",
             robot=robot,
-            things=Things(self._glasses, STANDS, BEADS),
+            things=SceneSpec(self._glasses, STANDS, BEADS),
             goals=1,
             motions=2,
             level=level,
@@ -213,9 +213,9 @@ class PourEnv(OneDemoEnv[PourProgress]):
             at = Pose.from_position_quaternion(tops[k])
             top = Pose.from_position_quaternion([0.0, 0.0, 0.5 * self._glasses[k].height])
             solids += [*self._task.furniture[k].at(at), Obstacle(self._glasses[k].shape, at @ top)]
-        return arm_room(self.arms[0], self._task.bodies[0], joints[0], pack(solids)) >= START_ROOM
+        return arm_clearance(self.arms[0], self._task.bodies[0], joints[0], pack(solids)) >= START_CLEARANCE
 
-    def _legs(self, start: Start) -> list[Leg]:
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
         """The carry: from above the source's stand to before the target, turned with the arm."""
         glass, rim, center = self._glasses[SOURCE], self._goal_pose[0, :3], start.objects[SOURCE, :3]
         hand = grasp(glass, center, self._yaw_at(center, SOURCE))
@@ -223,7 +223,7 @@ class PourEnv(OneDemoEnv[PourProgress]):
         above = [Pose.from_position_quaternion([0.0, 0.0, up]) @ hand for up in (*ABOVE, RAISED)]
         before, after = pouring(glass, rim, yaw, 0.0, BACK, UP), pouring(glass, rim, yaw, TILTED)
         keys = tuple((pose,) for pose in (*above[:-1], before, after))
-        return [Leg(above[-1], before, keys, glass.shape, tcp_from_glass(glass), motion=1)]
+        return [PlacementMotion(above[-1], before, keys, glass.shape, tcp_from_glass(glass), motion=1)]
 
     def _yaw_at(self, place: np.ndarray, glass: int) -> float:
         """Direction [rad] of a level hand: the ready one's, turned about the arm's base as the glass's place is."""

@@ -41,7 +41,7 @@ X, Y, Z, WAS_LIFTED, WAS_THERE, TILT, LOST = range(7)
 tilt [rad] and the most beads outside both glasses on the way between."""
 
 
-class Verdict(NamedTuple):
+class PourVerdict(NamedTuple):
     """What the compiled judge says of a state; counts and flags as whole numbers.
 
     Attributes:
@@ -115,8 +115,8 @@ def rim_gap(pose, height, other):
 
 
 @kernel
-def judged(poses, velocities, beads, touching, sizes, memory):
-    """Judge a state: the entries of a `Verdict`.
+def judge_state(poses, velocities, beads, touching, sizes, memory):
+    """Judge a state: the entries of a `PourVerdict`.
 
     Args:
         poses: (2, 7) source and target.
@@ -169,7 +169,7 @@ class PourProgress(Progress):
         super().__init__(dt)
         self.count, self._sizes = beads, sizes
         self._memory = np.concatenate([start[SOURCE, :3], [float(in_hand)], np.zeros(3)])
-        self.verdict = Verdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
+        self.verdict = PourVerdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
 
     @property
     def failed(self) -> bool:
@@ -207,10 +207,10 @@ class PourProgress(Progress):
             return "dropped"
         return "constraint" if self.verdict.lying > SPILLED * self.count else ""
 
-    def update(self, state: State) -> Verdict:
+    def update(self, state: State) -> PourVerdict:
         """Take in a new state."""
         poses, moving, beads = state.object_pose, state.object_velocity, state.bead_position
-        self.verdict = Verdict(*judged(poses, moving, beads, state.touching, self._sizes, self._memory))
+        self.verdict = PourVerdict(*judge_state(poses, moving, beads, state.touching, self._sizes, self._memory))
         self._settle(self.verdict.done == 1, self.verdict)
         return self.verdict
 
@@ -220,12 +220,12 @@ class PourProgress(Progress):
             return 1.0
         source, target = state.object_pose
         reach = 1.0 - math.tanh(5.0 * math.dist(state.tcp_pose[0, :3], source[:3]))
-        way = rim_gap(source, self._sizes[SOURCE, 1], target)
-        carry = 1.0 - math.tanh(5.0 * max(0.0, way - ARRIVED)) if self.verdict.held else 0.0
+        distance = rim_gap(source, self._sizes[SOURCE, 1], target)
+        carry = 1.0 - math.tanh(5.0 * max(0.0, distance - ARRIVED)) if self.verdict.held else 0.0
         poured = self.verdict.target / self.count
         return max(0.1 * reach + 0.1 * self.verdict.held + 0.2 * carry, 0.4 * (poured > 0.0)) + 0.5 * poured
 
-    def numbers(self) -> dict[str, Any]:
+    def task_info(self) -> dict[str, Any]:
         """The task's own entries of `info`."""
         _, target, outside = self.fractions
         return {

@@ -38,9 +38,9 @@ class TiltProgress(PourProgress):
         if self.success:
             return 1.0
         source, target = state.object_pose
-        way = max(0.0, float(rim_gap(source, self._sizes[SOURCE, 1], target)) - self._sizes[TARGET, 0])
+        distance = max(0.0, float(rim_gap(source, self._sizes[SOURCE, 1], target)) - self._sizes[TARGET, 0])
         tilt = min(1.0, float(tilt_of(source)) / TILTED)
-        return float(tilting(way, tilt, self.verdict.held, self.verdict.target / self.count))
+        return float(tilting(distance, tilt, self.verdict.held, self.verdict.target / self.count))
 
 
 class TiltPourEnv(SubTask[PourProgress], PourEnv):

@@ -23,28 +23,28 @@ def _around(turn, place, x, y, z):
 
 
 @kernel
-def _tool_room(tool, x, rows, vertices):
-    turn, place, room = (x[0], x[1], x[2], x[3]), screw.translation(x), np.inf
+def _tool_clearance(tool, x, rows, vertices):
+    turn, place, clearance = (x[0], x[1], x[2], x[3]), screw.translation(x), np.inf
     for c in range(len(tool)):
         a = _around(turn, place, tool[c, 0], tool[c, 1], tool[c, 2])
         b = _around(turn, place, tool[c, 3], tool[c, 4], tool[c, 5])
         for k in range(len(rows)):
-            room = min(room, closest(rows, k, vertices, a, b)[0] - tool[c, 6])
-    return room
+            clearance = min(clearance, closest(rows, k, vertices, a, b)[0] - tool[c, 6])
+    return clearance
 
 
 @kernel
-def _sweep_room(tool, poses, rows, vertices):
-    room = np.inf
+def _sweep_clearance(tool, poses, rows, vertices):
+    clearance = np.inf
     for i in range(len(poses)):
-        room = min(room, _tool_room(tool, screw.load8(poses, i), rows, vertices))
-    return room
+        clearance = min(clearance, _tool_clearance(tool, screw.load8(poses, i), rows, vertices))
+    return clearance
 
 
 @kernel
-def _arm_room(chain, q, body, first, last, frames, rows, vertices):
+def _arm_clearance(chain, q, body, first, last, frames, rows, vertices):
     forward(chain, q, frames)
-    room = np.inf
+    clearance = np.inf
     for c in range(len(body)):
         j = int(body[c, 0])
         if j < first or j > last:
@@ -56,25 +56,25 @@ def _arm_room(chain, q, body, first, last, frames, rows, vertices):
         a = _around(turn, place, body[c, 1], body[c, 2], body[c, 3])
         b = _around(turn, place, body[c, 4], body[c, 5], body[c, 6])
         for k in range(len(rows)):
-            room = min(room, closest(rows, k, vertices, a, b)[0] - body[c, 7])
-    return room
+            clearance = min(clearance, closest(rows, k, vertices, a, b)[0] - body[c, 7])
+    return clearance
 
 
-def tool_room(tool: np.ndarray, poses: np.ndarray, packed: Packed) -> float:
+def tool_clearance(tool: np.ndarray, poses: np.ndarray, packed: Packed) -> float:
     """Smallest room [m] of capsules of a hand, see `Body.tool`, at any of the poses (n, 8)."""
-    return float(_sweep_room(tool, poses, packed.rows, packed.vertices))
+    return float(_sweep_clearance(tool, poses, packed.rows, packed.vertices))
 
 
-def arm_room(arm: Arm, body: Body, q: np.ndarray, packed: Packed, joints: range | None = None) -> float:
+def arm_clearance(arm: Arm, body: Body, q: np.ndarray, packed: Packed, joints: range | None = None) -> float:
     """Smallest room [m] of an arm at joints q (dof,), or of what moves with some joints alone; -1 is its base."""
     part = joints or range(-1, arm.dof)
     work = np.empty((arm.dof, FRAME))
-    return float(_arm_room(arm.chain, q, body.rows, part[0], part[-1], work, packed.rows, packed.vertices))
+    return float(_arm_clearance(arm.chain, q, body.rows, part[0], part[-1], work, packed.rows, packed.vertices))
 
 
-def point_room(point: np.ndarray, packed: Packed) -> float:
+def point_clearance(point: np.ndarray, packed: Packed) -> float:
     """Smallest distance [m] of a point (3,) to some solids; infinite without any."""
-    return float(_tool_room(_POINT, tuple(Pose.from_position_quaternion(point).dq), packed.rows, packed.vertices))
+    return float(_tool_clearance(_POINT, tuple(Pose.from_position_quaternion(point).dq), packed.rows, packed.vertices))
 
 
 def capsule_ends(arm: Arm, body: Body, q: np.ndarray, joints: range) -> np.ndarray:

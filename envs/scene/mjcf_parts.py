@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
-from .scene_objects import Beads, Book, Color, Furniture, Glass, Solid, half_sizes
+from .scene_objects import Beads, Book, Color, FreeBody, Furniture, Glass, half_sizes
 
 FRICTION = "1.0 0.005 0.0001"
 """Sliding, torsional, rolling."""
@@ -51,7 +51,7 @@ def _free(name: str) -> Element:
     return body
 
 
-def solid_body(solid: Solid) -> Element:
+def solid_body(solid: FreeBody) -> Element:
     """A free body of one shape."""
     body = _free(solid.name)
     kind, size = half_sizes(solid.shape)

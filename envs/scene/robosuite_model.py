@@ -21,7 +21,7 @@ from robosuite.utils.mjcf_utils import CustomMaterial
 
 from .baxter_trunk import slice_trunk
 from .mjcf_parts import bead_bodies, book_body, furniture_body, glass_body, obstacle_bodies, solid_body
-from .scene_objects import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, Glass, Solid, Things, half_sizes
+from .scene_objects import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, FreeBody, Glass, SceneSpec, half_sizes
 from .servos import leave_out_unused, mend_robot, use_velocity_servos
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
@@ -32,8 +32,8 @@ FRICTION = (1.0, 0.005, 0.0001)
 class OneDemoTableScene(ManipulationEnv):
     """Robot, table and things; used for its model only."""
 
-    def __init__(self, robot: str, gripper: str, things: Things, place: tuple[float | None, float]):
-        self.things, self.place = things, place
+    def __init__(self, robot: str, gripper: str, spec: SceneSpec, place: tuple[float | None, float]):
+        self.spec, self.place = spec, place
         super().__init__(
             robots=robot,
             gripper_types=gripper,
@@ -56,9 +56,9 @@ class OneDemoTableScene(ManipulationEnv):
         arena.set_origin([0, 0, 0])
         arena.table_visual.attrib.pop("material", None)
         arena.table_visual.set("rgba", TABLE_COLOR)
-        wooden = [_wooden(each) for each in self.things.objects if isinstance(each, Solid) and each.texture]
+        wooden = [_wooden(each) for each in self.spec.objects if isinstance(each, FreeBody) and each.texture]
         self.model = ManipulationTask(arena, [robot_model], wooden)
-        self.model.worldbody.extend(_other_bodies(self.things))
+        self.model.worldbody.extend(_other_bodies(self.spec))
         slice_trunk(self.model.root)
         mend_robot(self.model.root)
         use_velocity_servos(self.model.root, set(robot_model.joints))
@@ -69,17 +69,17 @@ class OneDemoTableScene(ManipulationEnv):
         return 0.0
 
 
-def _other_bodies(things: Things) -> list[Element]:
+def _other_bodies(spec: SceneSpec) -> list[Element]:
     """Everything that robosuite's own objects cannot be."""
-    free = [glass_body(each) for each in things.objects if isinstance(each, Glass)]
-    free += [solid_body(each) for each in things.objects if isinstance(each, Solid) and not each.texture]
-    free += [book_body(each) for each in things.objects if isinstance(each, Book)]
-    free += [furniture_body(each) for each in things.furniture]
-    beads = bead_bodies(things.beads) if things.beads else []
-    return [*free, *beads, *obstacle_bodies(things.obstacles)]
+    free = [glass_body(each) for each in spec.objects if isinstance(each, Glass)]
+    free += [solid_body(each) for each in spec.objects if isinstance(each, FreeBody) and not each.texture]
+    free += [book_body(each) for each in spec.objects if isinstance(each, Book)]
+    free += [furniture_body(each) for each in spec.furniture]
+    beads = bead_bodies(spec.beads) if spec.beads else []
+    return [*free, *beads, *obstacle_bodies(spec.obstacles)]
 
 
-def _wooden(block: Solid) -> BoxObject:
+def _wooden(block: FreeBody) -> BoxObject:
     material = CustomMaterial(
         texture=block.texture,
         tex_name=f"{block.name}_texture",
@@ -97,7 +97,7 @@ def _wooden(block: Solid) -> BoxObject:
     )
 
 
-def table_env(robot: str, gripper: str, things: Things, place: tuple[float | None, float]) -> Any:
+def table_env(robot: str, gripper: str, spec: SceneSpec, place: tuple[float | None, float]) -> Any:
     """A robosuite environment with the compiled model of the scene; `gripper` and `place`: see `Robot`."""
     ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
-    return OneDemoTableScene(robot, gripper, things, place)
+    return OneDemoTableScene(robot, gripper, spec, place)

@@ -11,10 +11,10 @@ from ...planner.geometry.shapes import Capsule, Obstacle, pack
 from ...planner.robot.arm import Arm
 from ...planner.robot.body import RADIUS, Body
 from ...planner.robot.chain_readers import turn_z_to
-from .body_clearance import arm_room, capsule_ends
+from .body_clearance import arm_clearance, capsule_ends
 from .robot_bodies import robot_body
 from .robots import robot_named
-from .scene import Scene
+from .scene import CompiledScene
 
 PARKED = "other arm"
 """Name of an arm that does nothing, among the fixtures."""
@@ -34,7 +34,7 @@ class RobotParts(NamedTuple):
     touching: tuple[tuple[str, str], ...]
 
 
-def robot_parts(robot: str, scene: Scene) -> RobotParts:
+def robot_parts(robot: str, scene: CompiledScene) -> RobotParts:
     """What is known of the robot of a scene."""
     order = list(robot_named(robot).ready)
     bodies = tuple(robot_body(robot, order.index(index.side)) for index in scene.arms)
@@ -67,6 +67,6 @@ def _touching(
             for arm, body, q in zip(arms, bodies, home, strict=True)
             for fixture in fixtures
             for joint in range(arm.dof - 1)
-            if arm_room(arm, body, q, pack([fixture]), range(joint, joint + 1)) < 0.0
+            if arm_clearance(arm, body, q, pack([fixture]), range(joint, joint + 1)) < 0.0
         )
     )

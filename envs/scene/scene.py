@@ -18,7 +18,7 @@ from ...planner.robot.arm import Arm
 from .arm_index import ArmIndex, arm_index
 from .fixed_shapes import static_shapes
 from .robots import robot_named
-from .scene_objects import NOTHING, Things
+from .scene_objects import NOTHING, SceneSpec
 
 WORLD, ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, OBSTACLE, FURNITURE, BEAD, FIRST_OBJECT = range(9)
 """Who a geom belongs to: what is fixed to the world, the first arm, its fingers, the second arm, its fingers, an
@@ -26,7 +26,7 @@ obstacle, furniture, a bead, or object k as FIRST_OBJECT + k."""
 
 
 @dataclass(frozen=True)
-class Scene:
+class CompiledScene:
     """A compiled scene; `model` is shared: copy it before changing it.
 
     Attributes:
@@ -60,12 +60,12 @@ class Scene:
 
 
 @lru_cache(maxsize=16)
-def compiled_scene(robot: str, things: Things = NOTHING, arms: tuple[str, ...] | None = None) -> Scene:
+def compiled_scene(robot: str, spec: SceneSpec = NOTHING, arms: tuple[str, ...] | None = None) -> CompiledScene:
     """The scene of a robot at a table with things; compiled once per process.
 
     Args:
         robot: one of `ROBOTS`.
-        things: what there is besides.
+        spec: what there is besides.
         arms: names of the arms that work, in the order of observations; None: the robot's first.
 
     Raises:
@@ -74,22 +74,22 @@ def compiled_scene(robot: str, things: Things = NOTHING, arms: tuple[str, ...] |
     """
     kind = robot_named(robot)
     working = kind.checked_arms(arms, robot)
-    env = _model_library().table_env(robot, kind.gripper, things, kind.place(working))
+    env = _model_library().table_env(robot, kind.gripper, spec, kind.place(working))
     model, rob = copy.copy(env.sim.model._model), env.robots[0]
     indices = {side: arm_index(model, rob, side, kind.speeds, robot) for side in rob.arms}
     idle = tuple(side for side in rob.arms if side not in working)
-    objects = np.array([_body_of(model, each.name) for each in things.objects], dtype=np.int64)
-    furniture = np.array([model.body(each.name).id for each in things.furniture], dtype=np.int64)
-    bodies = [model.body(f"obstacle{k}").id for k in range(things.obstacles)]
+    objects = np.array([_body_of(model, each.name) for each in spec.objects], dtype=np.int64)
+    furniture = np.array([model.body(each.name).id for each in spec.furniture], dtype=np.int64)
+    bodies = [model.body(f"obstacle{k}").id for k in range(spec.obstacles)]
     obstacles = np.array([(body, *_geoms(model, body)) for body in bodies], dtype=np.int64).reshape(-1, 3)
-    beads = [model.body(f"bead{k}").id for k in range(things.beads.count)] if things.beads else []
+    beads = [model.body(f"bead{k}").id for k in range(spec.beads.count)] if spec.beads else []
     joints = model.body_jntadr[np.array(beads, dtype=np.int64)]
     places = model.jnt_qposadr[joints[:, None] + np.arange(3)].astype(np.int64)
     known = {**{int(body): FIRST_OBJECT + k for k, body in enumerate(objects)}, **dict.fromkeys(beads, BEAD)}
     known |= {**{int(body): FURNITURE for body in furniture}, **dict.fromkeys(bodies, OBSTACLE)}
     owner, labels = _owners(model, [indices[side] for side in (*working, *idle)], known)
     dof = len(kind.speeds)
-    return Scene(
+    return CompiledScene(
         model=model,
         arms=tuple(indices[side] for side in working),
         home=np.array([kind.ready[side] for side in working]),

@@ -20,7 +20,7 @@ MATT: Color = (0.62, 0.60, 0.57, 1.0)
 
 
 @dataclass(frozen=True)
-class Solid:
+class FreeBody:
     """A free body of one shape.
 
     Attributes:
@@ -112,7 +112,7 @@ class Beads:
 
 
 @dataclass(frozen=True)
-class Part:
+class FixedShape:
     """A piece of furniture.
 
     Attributes:
@@ -141,11 +141,11 @@ class Furniture:
     """
 
     name: str
-    parts: tuple[Part, ...]
+    parts: tuple[FixedShape, ...]
 
 
 @dataclass(frozen=True)
-class Things:
+class SceneSpec:
     """Everything in a scene besides robot and table.
 
     Attributes:
@@ -155,13 +155,13 @@ class Things:
         obstacles: how many bodies of any shape may be in the way at once.
     """
 
-    objects: tuple[Solid | Glass | Book, ...] = ()
+    objects: tuple[FreeBody | Glass | Book, ...] = ()
     furniture: tuple[Furniture, ...] = ()
     beads: Beads | None = None
     obstacles: int = 0
 
 
-NOTHING = Things()
+NOTHING = SceneSpec()
 
 
 def half_sizes(shape: Shape) -> tuple[str, tuple[float, float, float]]:

@@ -17,7 +17,7 @@ MOST_BOOKS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Ranges:
+class ShelveRanges:
     """How far a layout may differ from the nominal one.
 
     Attributes:
@@ -48,11 +48,13 @@ class Ranges:
 
 
 RANGES = {
-    "L0": Ranges(),
-    "L1": Ranges(
+    "L0": ShelveRanges(),
+    "L1": ShelveRanges(
         0.04, 0.05, 0.025, np.deg2rad(10.0), 0.01, np.deg2rad(5.0), 0.015, 0.003, np.deg2rad(2.0), 0.006, 0.05
     ),
-    "L2": Ranges(0.08, 0.10, 0.05, np.deg2rad(15.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10),
+    "L2": ShelveRanges(
+        0.08, 0.10, 0.05, np.deg2rad(15.0), 0.02, np.deg2rad(15.0), 0.03, 0.005, np.deg2rad(4.0), 0.01, 0.10
+    ),
 }
 """By the name of a layout, see `levels`."""
 
@@ -104,7 +106,7 @@ class ShelfLayout:
 
 
 def shelf_layout(
-    rng: np.random.Generator, ranges: Ranges, places: ShelfPlaces, count: int, joints: tuple[int, ...]
+    rng: np.random.Generator, ranges: ShelveRanges, places: ShelfPlaces, count: int, joints: tuple[int, ...]
 ) -> ShelfLayout:
     """A layout of `count` books, drawn from its ranges; `joints` is the shape (n_arms, dof) of the start joints."""
     x, y = places.stand[:2] + rng.uniform(-ranges.stand, ranges.stand, 2)

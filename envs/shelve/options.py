@@ -38,14 +38,14 @@ def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlace
     changes: dict[str, Any] = {}
     if "stand_pose" in options:
         lower = min(STAND_LOWER, places.stand[2] - LOWEST_STAND)
-        nominal, way = (places.stand, places.stand_yaw), (STAND_WAY, lower, STAND_HIGHER, STAND_TURN)
-        changes["stand"] = _standing("stand_pose", options["stand_pose"], nominal, way)
+        nominal, bounds = (places.stand, places.stand_yaw), (STAND_WAY, lower, STAND_HIGHER, STAND_TURN)
+        changes["stand"] = _standing("stand_pose", options["stand_pose"], nominal, bounds)
     if "cupboard_pose" in options:
-        nominal, way = (
+        nominal, bounds = (
             ((*places.cupboard, TABLE_HEIGHT), places.cupboard_yaw),
             (CUPBOARD_WAY, 0.001, 0.001, CUPBOARD_TURN),
         )
-        changes["cupboard"] = _standing("cupboard_pose", options["cupboard_pose"], nominal, way)
+        changes["cupboard"] = _standing("cupboard_pose", options["cupboard_pose"], nominal, bounds)
     if "slots" in options:
         changes["slots"] = float(checked_array("slots", options["slots"], ()))
     if "books" in options:
@@ -57,11 +57,11 @@ def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlace
     return layout
 
 
-def _standing(option: str, value: Any, nominal: tuple[Any, float], way: tuple[float, float, float, float]) -> Pose:
-    """An upright pose near the nominal place (x, y, z) and yaw, by at most `way` to the side, down, up and in yaw."""
+def _standing(option: str, value: Any, nominal: tuple[Any, float], bounds: tuple[float, float, float, float]) -> Pose:
+    """Check an upright pose: at most `bounds` (aside, down, up, yaw) from the nominal place (x, y, z) and yaw."""
     pose = Pose.from_vector(checked_poses(option, [value], 1)[0])
     (x, y, z), yaw = nominal
-    aside, lower, higher, turn = way
+    aside, lower, higher, turn = bounds
     off = pose.position - (x, y, z)
     if pose.tilt > 0.01:
         raise BadOption(option, "is tilted; only a yaw is possible")

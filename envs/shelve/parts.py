@@ -6,7 +6,7 @@ import numpy as np
 
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box, Cylinder
-from ..scene.scene_objects import TABLE_HEIGHT, Book, Color, Furniture, Part
+from ..scene.scene_objects import TABLE_HEIGHT, Book, Color, FixedShape, Furniture
 
 BOOK_SIZE = (0.16, 0.035, 0.22)
 """Of the books to shelve: depth, thickness, height [m]; 0.3 kg."""
@@ -47,8 +47,8 @@ def books(count: int) -> tuple[Book, ...]:
     return (*wanted, *(Book(f"clutter{k}", size, color) for k, (*_, size, color) in enumerate(CLUTTER)))
 
 
-def _board(size: tuple[float, float, float], place: tuple[float, float, float], color: Color = WOOD) -> Part:
-    return Part(Box(size), (*place, 1.0, 0.0, 0.0, 0.0), color)
+def _board(size: tuple[float, float, float], place: tuple[float, float, float], color: Color = WOOD) -> FixedShape:
+    return FixedShape(Box(size), (*place, 1.0, 0.0, 0.0, 0.0), color)
 
 
 def cupboard() -> Furniture:
@@ -72,9 +72,9 @@ def cupboard() -> Furniture:
 
 def stand() -> tuple[Furniture, Furniture]:
     """A plate on a rod, its frame in the middle of the plate's top, x along the way in; and the tube it slides in."""
-    rod = Part(Cylinder(0.016, 0.238), (0.0, 0.0, -0.131, 1.0, 0.0, 0.0, 0.0), STEEL)
-    tube = Part(Cylinder(0.021, 0.18), (0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0), STEEL)
-    foot = Part(Cylinder(0.055, 0.012), (0.0, 0.0, 0.006, 1.0, 0.0, 0.0, 0.0), STEEL)
+    rod = FixedShape(Cylinder(0.016, 0.238), (0.0, 0.0, -0.131, 1.0, 0.0, 0.0, 0.0), STEEL)
+    tube = FixedShape(Cylinder(0.021, 0.18), (0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0), STEEL)
+    foot = FixedShape(Cylinder(0.055, 0.012), (0.0, 0.0, 0.006, 1.0, 0.0, 0.0, 0.0), STEEL)
     plate = _board(PLATE, (0.0, 0.0, -0.5 * PLATE[2]), DARK_WOOD)
     return Furniture("stand", (plate, rod)), Furniture("foot", (foot, tube))
 

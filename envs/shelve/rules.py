@@ -32,7 +32,7 @@ PUSHED, PUSHED_OVER = 0.05, np.deg2rad(15.0)
 """A clutter book that was moved or turned by more than this was pushed over [m, rad]."""
 
 
-class Verdict(NamedTuple):
+class ShelveVerdict(NamedTuple):
     """What the compiled judge says of a state; counts and flags as whole numbers.
 
     Attributes:
@@ -103,8 +103,8 @@ def allowed_contact(low, high, placed, handed, n):
 
 
 @kernel
-def judged(poses, velocities, tcp, touching, goals, start, handed, lifted, errors):
-    """Judge a state: the entries of a `Verdict`.
+def judge_state(poses, velocities, tcp, touching, goals, start, handed, lifted, errors):
+    """Judge a state: the entries of a `ShelveVerdict`.
 
     Args:
         poses: (m, 7) books, then clutter.
@@ -209,12 +209,12 @@ class ShelveProgress(Progress):
         self._start[self.handed] = pose
         self.handed += 1
 
-    def update(self, state: State) -> Verdict:
+    def update(self, state: State) -> ShelveVerdict:
         """Take in a new state."""
         self._errors = np.empty((2, self.n_books))
         poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
         known = (self._goals, self._start, self.handed, self._lifted, self._errors)
-        verdict = Verdict(*judged(poses, moving, tcp, state.touching, *known))
+        verdict = ShelveVerdict(*judge_state(poses, moving, tcp, state.touching, *known))
         self.placed, self.held, self.toppled = verdict.placed, verdict.held == 1, verdict.toppled == 1
         self._settle(verdict.settled == 1, verdict)
         self._best_stage = max(self._best_stage, 2 * verdict.placed + verdict.raised)
@@ -226,7 +226,7 @@ class ShelveProgress(Progress):
         """The dense reward of the state taken in last."""
         return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
-    def numbers(self) -> dict[str, Any]:
+    def task_info(self) -> dict[str, Any]:
         """The task's own entries of `info`."""
         return {
             "books_placed": self.placed,

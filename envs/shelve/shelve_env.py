@@ -10,12 +10,12 @@ from ...planner.errors import BadOption
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box, Obstacle, pack
 from ..core.environment import MAX_LAYOUTS, Observation, OneDemoEnv, checked_choice
-from ..core.obstacle_placement import Leg, Order
+from ..core.obstacle_placement import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints
 from ..core.spaces import pose_box
-from ..scene.body_clearance import arm_room
+from ..scene.body_clearance import arm_clearance
 from ..scene.robots import places_of, robot_named
-from ..scene.scene_objects import Things
+from ..scene.scene_objects import SceneSpec
 from ..simulation.render import Ghost, View
 from ..simulation.simulation import Start
 from ..simulation.state import State
@@ -33,7 +33,7 @@ GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0
 SPREAD = 0.15
 """Of obstacles about the hand's way [m]: a book and the hand behind it sweep far more than the way itself, which is
 so short that what lies right on it would be in the way of the hand before the slot, too."""
-START_CLEAR = 0.03
+START_CLEARANCE = 0.03
 """The robot is at least this far from the first book at the start [m]."""
 CLEAR = 0.08
 """The robot is at least this far from the stand while a book is put there [m]."""
@@ -119,7 +119,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
     level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"` (two of different
     size appear while the last two books are carried), `control_mode="joint_velocity" | "ee_twist"`,
     `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
-    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `stand_pose` (7,),
+    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `ScheduledObstacle`), `stand_pose` (7,),
     `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `books` (n, 3: x, y [m] and yaw [rad] of each on the
     stand, from its middle), `clutter` (5, 2: gaps [m] from neighbor or wall, and from the front) and
     `joint_positions` (7,).
@@ -149,7 +149,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
         super().__init__(
             name="shelve",
             robot=robot,
-            things=Things(objects, furniture),
+            things=SceneSpec(objects, furniture),
             goals=n_books,
             motions=2 * n_books,
             level=level,
@@ -185,7 +185,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
             if "joint_positions" in options:
                 return drawn, checked_joints(options["joint_positions"], self.arms)
             joints = np.clip(self._ready + drawn.joints, lower, upper)
-            if self._is_clear(drawn.handed(0), joints, START_CLEAR):
+            if self._is_clear(drawn.handed(0), joints, START_CLEARANCE):
                 return drawn, joints
         raise BadOption("stand_pose", "the robot would start at the book; give joint_positions that are away from it")
 
@@ -203,15 +203,15 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
             self._progress.hand_over(pose)
         return reached
 
-    def _is_clear(self, place: Pose, joints: np.ndarray, room: float) -> bool:
-        """Whether the whole robot, at joints (n_arms, dof), is `room` away from where a book is or is to be put."""
+    def _is_clear(self, place: Pose, joints: np.ndarray, clearance: float) -> bool:
+        """Whether the whole robot, at joints (n_arms, dof), keeps the clearance [m] from a book's place."""
         book = pack([Obstacle(Box(BOOK_SIZE), place)])
         return all(
-            arm_room(arm, body, q, book) >= room
+            arm_clearance(arm, body, q, book) >= clearance
             for arm, body, q in zip(self.arms, self._task.bodies, joints, strict=True)
         )
 
-    def _legs(self, start: Start) -> list[Leg]:
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
         """The carries: from above the stand to before the slot."""
         legs = []
         for k, goal in enumerate(self._goal_pose):
@@ -220,13 +220,13 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
             back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
             keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
             held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
-            legs.append(Leg(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
+            legs.append(PlacementMotion(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
         return legs
 
-    def _paper(self, legs: list[Leg]) -> list[Order]:
+    def _paper(self, legs: list[PlacementMotion]) -> list[ObstacleRequest]:
         """One appears while the last but one book is carried, another one, of another size, with the last."""
         last = len(legs) - 1
-        return [Order("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
+        return [ObstacleRequest("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose[self._progress.placed :]]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box, Capsule, Shape, Sphere
-from ..scene.scene import Scene
+from ..scene.scene import CompiledScene
 from ..scene.scene_objects import extents, half_sizes
 
 KINDS: dict[type, float] = {Sphere: 1.0, Box: 2.0, Capsule: 3.0}
@@ -20,14 +20,14 @@ GEOM = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
 }
-AWAY = (0.0, 0.0, -3.0)
+PARKED_AT = (0.0, 0.0, -3.0)
 """Where an obstacle is that is not there [m]."""
-ROOM = 0.05
+CLEARANCE = 0.05
 """Nothing appears nearer than this to the robot or an object [m]: it waits until there is room."""
 
 
 @dataclass(frozen=True)
-class Intruder:
+class ScheduledObstacle:
     """A body in the way. Its center is at `center + long sin(w t + phase) + short cos(w t + phase)`.
 
     Attributes:
@@ -81,19 +81,19 @@ def described(shape: Shape) -> np.ndarray:
     raise TypeError(f"an obstacle is a sphere, a box or a capsule, not {type(shape).__name__}")
 
 
-class ObstacleSlots:
+class ObstacleBodies:
     """The obstacles of an episode in a simulation's model and data, and what is observed of them.
 
     Attributes:
-        intruders: those of this episode.
+        scheduled_obstacles: those of this episode.
         active: (n,) which are there.
     """
 
-    def __init__(self, scene: Scene, model: mujoco.MjModel, data: mujoco.MjData):
+    def __init__(self, scene: CompiledScene, model: mujoco.MjModel, data: mujoco.MjData):
         self._index, self._model, self._data = scene.obstacles, model, data
         self._mocap = model.body_mocapid[scene.obstacles[:, 0]]
         count = len(scene.obstacles)
-        self.intruders: tuple[Intruder, ...] = ()
+        self.scheduled_obstacles: tuple[ScheduledObstacle, ...] = ()
         self.active = np.zeros(count, dtype=bool)
         self._due = np.full(count, np.inf)
 
@@ -102,14 +102,14 @@ class ObstacleSlots:
         """How many there can be."""
         return len(self._index)
 
-    def reset(self, intruders: tuple[Intruder, ...]) -> None:
+    def reset(self, scheduled_obstacles: tuple[ScheduledObstacle, ...]) -> None:
         """Take the obstacles of a new episode; those there from the start are put in place."""
-        self.intruders = intruders
+        self.scheduled_obstacles = scheduled_obstacles
         self.active[:] = False
         self._due[:] = np.inf
         for slot in range(self.count):
             self._park(slot)
-        for slot, each in enumerate(intruders):
+        for slot, each in enumerate(scheduled_obstacles):
             self._form(slot, each.shape)
             if each.motion == 0:
                 self._due[slot] = 0.0
@@ -123,7 +123,7 @@ class ObstacleSlots:
             motion: index of the current motion.
             has_room: called with a slot and a pose; whether a body may appear there.
         """
-        for slot, each in enumerate(self.intruders):
+        for slot, each in enumerate(self.scheduled_obstacles):
             if self.active[slot]:
                 if each.frequency:
                     self._data.mocap_pos[self._mocap[slot]] = each.position(seconds)
@@ -136,10 +136,10 @@ class ObstacleSlots:
     def observed(self, seconds: float) -> dict[str, np.ndarray]:
         """The entries of the observation, in new arrays."""
         entries = self._blank()
-        if not self.intruders:
+        if not self.scheduled_obstacles:
             return entries
         for slot in np.flatnonzero(self.active):
-            each = self.intruders[slot]
+            each = self.scheduled_obstacles[slot]
             entries["obstacle_active"][slot] = 1.0
             entries["obstacle_shape"][slot] = KINDS[type(each.shape)]
             entries["obstacle_size"][slot] = described(each.shape)
@@ -164,7 +164,7 @@ class ObstacleSlots:
         model.bvh_aabb[nodes] = box
 
     def _show(self, slot: int, seconds: float) -> None:
-        pose, solid = self.intruders[slot].pose(seconds), self._index[slot, 1]
+        pose, solid = self.scheduled_obstacles[slot].pose(seconds), self._index[slot, 1]
         self._model.geom_contype[solid] = self._model.geom_conaffinity[solid] = 1
         self._data.mocap_pos[self._mocap[slot]] = pose.position
         self._data.mocap_quat[self._mocap[slot]] = pose.quaternion
@@ -173,4 +173,4 @@ class ObstacleSlots:
     def _park(self, slot: int) -> None:
         solid = self._index[slot, 1]
         self._model.geom_contype[solid] = self._model.geom_conaffinity[solid] = 0
-        self._data.mocap_pos[self._mocap[slot]] = AWAY
+        self._data.mocap_pos[self._mocap[slot]] = PARKED_AT

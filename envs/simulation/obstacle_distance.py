@@ -9,8 +9,8 @@ import numpy as np
 
 from ...planner.geometry.pose import Pose
 from ...planner.jit import kernel
-from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, Scene
-from .moving_obstacles import ROOM
+from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, CompiledScene
+from .moving_obstacles import CLEARANCE
 
 FAR = 10.0
 """No distance is looked for beyond this [m]."""
@@ -33,10 +33,10 @@ def _candidates(places, bounds, geoms, center, bound, best, found):
     return count
 
 
-class Nearness:
+class ObstacleDistance:
     """Distances of a simulated robot, and of what it holds, to obstacles."""
 
-    def __init__(self, scene: Scene, model: mujoco.MjModel, data: mujoco.MjData):
+    def __init__(self, scene: CompiledScene, model: mujoco.MjModel, data: mujoco.MjData):
         self._model, self._data = model, data
         solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
         self._robot = np.flatnonzero(solid & np.isin(scene.owner, ROBOT))
@@ -65,11 +65,11 @@ class Nearness:
         return self._smallest
 
     def has_room(self, slot: int, pose: Pose) -> bool:
-        """Whether an obstacle may appear at a pose: the robot and all objects are `ROOM` away."""
+        """Whether an obstacle may appear at a pose: the robot and all objects are `CLEARANCE` away."""
         data, geom = self._data, self._solid[slot]
         # MuJoCo computes these two anew at the next step
         data.geom_xpos[geom], data.geom_xmat[geom] = pose.position, pose.rotation.ravel()
-        return all(self._nearest(slot, geoms, ROOM) >= ROOM for geoms in (self._robot, *self._objects))
+        return all(self._nearest(slot, geoms, CLEARANCE) >= CLEARANCE for geoms in (self._robot, *self._objects))
 
     def _take(self, slot: int, geoms: np.ndarray) -> None:
         self._smallest = self._nearest(slot, geoms, self._smallest)

@@ -12,9 +12,9 @@ import numpy as np
 from ...planner.robot.kinematics import FRAME
 from ..scene.arm_index import ArmIndex
 from ..scene.scene import FINGERS, FIRST_OBJECT, compiled_scene
-from ..scene.scene_objects import Things
-from .moving_obstacles import Intruder, ObstacleSlots
-from .obstacle_distance import Nearness
+from ..scene.scene_objects import SceneSpec
+from .moving_obstacles import ObstacleBodies, ScheduledObstacle
+from .obstacle_distance import ObstacleDistance
 from .state import State, command, read_arms, read_objects
 
 PHYSICS_DT = 0.002
@@ -28,7 +28,7 @@ class Start(NamedTuple):
         objects: (n_objects, 7) world poses, x y z [m] and wxyz.
         furniture: (n_furniture, 7) world poses.
         beads: (n_beads, 3) places [m].
-        intruders: the obstacles.
+        scheduled_obstacles: the obstacles.
         grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing round something; nan: it is open.
     """
 
@@ -36,14 +36,14 @@ class Start(NamedTuple):
     objects: np.ndarray
     furniture: np.ndarray = np.zeros((0, 7))
     beads: np.ndarray = np.zeros((0, 3))
-    intruders: tuple[Intruder, ...] = ()
+    scheduled_obstacles: tuple[ScheduledObstacle, ...] = ()
     grips: np.ndarray | None = None
 
 
 class Simulation:
     """A scene being simulated: state in, physics, state out."""
 
-    def __init__(self, robot: str, things: Things, sides: tuple[str, ...] | None = None):
+    def __init__(self, robot: str, things: SceneSpec, sides: tuple[str, ...] | None = None):
         self.scene = compiled_scene(robot, things, sides)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
@@ -63,8 +63,8 @@ class Simulation:
         self._object_places = model.jnt_qposadr[model.body_jntadr[bodies]].astype(np.int64)
         self._object_index = np.column_stack([self._object_places, model.body_dofadr[bodies]])
         self._touching = np.zeros((owners, owners))
-        self.obstacles = ObstacleSlots(self.scene, model, data)
-        self._near = Nearness(self.scene, model, data)
+        self.obstacles = ObstacleBodies(self.scene, model, data)
+        self._near = ObstacleDistance(self.scene, model, data)
         self._no_beads = np.zeros((0, 3))
 
     def reset(self, start: Start) -> None:
@@ -82,7 +82,7 @@ class Simulation:
             self.data.mocap_quat[self.scene.furniture] = start.furniture[:, 3:]
         if len(start.beads):
             self.data.qpos[self.scene.beads] = start.beads
-        self.obstacles.reset(start.intruders)
+        self.obstacles.reset(start.scheduled_obstacles)
         self._near.reset()
         mujoco.mj_forward(self.model, self.data)
 
@@ -101,12 +101,12 @@ class Simulation:
 
     def advance_obstacles(self, seconds: float, motion: float) -> None:
         """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""
-        if self.obstacles.intruders:
+        if self.obstacles.scheduled_obstacles:
             self.obstacles.advance(seconds, motion, self._near.has_room)
 
     def nearest_obstacle(self) -> float:
         """Smallest distance [m] of the robot, or of what it holds, to an obstacle in this episode; infinite if none."""
-        if not self.obstacles.intruders:
+        if not self.obstacles.scheduled_obstacles:
             return math.inf
         return self._near.smallest(self.obstacles.active, self._touching)
 

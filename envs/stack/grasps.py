@@ -7,7 +7,7 @@ import numpy as np
 from ...planner.errors import BadOption
 from ...planner.geometry.pose import Pose
 from ..scene.scene_objects import TABLE_HEIGHT
-from .layout import TABLE_EDGE, Layout
+from .layout import TABLE_EDGE, StackLayout
 from .rules import BLOCK, BLOCK_SIZE
 
 DOWN = (0.0, 1.0, 0.0, 0.0)
@@ -26,7 +26,7 @@ def above(pose: Pose, height: float) -> Pose:
     return Pose.from_position_quaternion([0, 0, height]) @ pose
 
 
-def block_poses(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+def block_poses(layout: StackLayout) -> tuple[np.ndarray, np.ndarray]:
     """World poses (n, 7) of the blocks and (7,) of the lowest goal."""
     rows = np.vstack([layout.blocks, layout.base])
     height = TABLE_HEIGHT + 0.5 * BLOCK_SIZE[2]

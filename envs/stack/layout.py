@@ -24,7 +24,7 @@ MAX_TRIES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Ranges:
+class StackRanges:
     """How far a layout may differ from the nominal one.
 
     Attributes:
@@ -41,15 +41,15 @@ class Ranges:
 
 
 RANGES = {
-    "L0": Ranges(0.0, 0.0, 0.0, 0.0),
-    "L1": Ranges(0.10, 0.05, np.deg2rad(30.0), 0.05),
-    "L2": Ranges(0.20, 0.10, np.deg2rad(120.0), 0.15),
+    "L0": StackRanges(0.0, 0.0, 0.0, 0.0),
+    "L1": StackRanges(0.10, 0.05, np.deg2rad(30.0), 0.05),
+    "L2": StackRanges(0.20, 0.10, np.deg2rad(120.0), 0.15),
 }
 """By the name of a layout, see `levels`."""
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class StackLayout:
     """A start.
 
     Attributes:
@@ -71,13 +71,13 @@ def nominal_blocks(count: int) -> np.ndarray:
 
 def stack_layout(
     rng: np.random.Generator,
-    ranges: Ranges,
+    ranges: StackRanges,
     count: int,
     arm_axis: np.ndarray,
     joints: tuple[int, ...],
     base_gap: float = BASE_GAP,
     reach: tuple[float, float] = REACH,
-) -> Layout:
+) -> StackLayout:
     """A layout of blocks and base place by rejection: independent of any method.
 
     Args:
@@ -100,7 +100,7 @@ def stack_layout(
         if fits(places, base, arm_axis, base_gap, reach):
             yaws = rng.uniform(-ranges.yaw, ranges.yaw, count + 1)
             blocks = np.column_stack([places, yaws[:count]])
-            return Layout(blocks, np.append(base, yaws[count]), offsets)
+            return StackLayout(blocks, np.append(base, yaws[count]), offsets)
     raise BadOption("n_blocks", f"{count} blocks do not fit on the table at this level")
 
 

@@ -10,7 +10,7 @@ from ...planner.errors import BadOption
 from ..core.dense_reward import closeness, placing
 from ..core.environment import checked_choice
 from ..core.grasped_start import SQUEEZE, holding_joints
-from ..core.obstacle_placement import Leg
+from ..core.obstacle_placement import PlacementMotion
 from ..core.reset_options import checked_joints, checked_poses
 from ..core.single_motion import FREQUENCY, Agreement, SubTask, gaps
 from ..core.spaces import REACH
@@ -185,8 +185,8 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
         q = holding_joints(arm, block_grasps(poses[-1], UP), joints[0])
         return None if q is None else q[None]
 
-    def _legs(self, start: Start) -> list[Leg]:
-        return super()._legs(start)[-1:]
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
+        return super()._placement_motions(start)[-1:]
 
     def achieved_goal(self, state: State) -> np.ndarray:
         """(8,) the block, and whether it is let go."""

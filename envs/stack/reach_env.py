@@ -9,12 +9,12 @@ import numpy as np
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box, Sphere
 from ..core.dense_reward import closeness
-from ..core.obstacle_placement import Leg
+from ..core.obstacle_placement import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
 from ..core.single_motion import FREQUENCY, Agreement, SubTask, gaps
 from ..core.spaces import REACH
 from ..scene.robots import robot_named
-from ..scene.scene_objects import Solid, Things
+from ..scene.scene_objects import FreeBody, SceneSpec
 from ..simulation.render import Ghost
 from ..simulation.simulation import Start
 from ..simulation.state import State
@@ -121,7 +121,7 @@ class ReachEnv(SubTask[ReachProgress]):
         super().__init__(
             name="reach",
             robot=robot,
-            things=Things((Solid("block0", Box(BLOCK_SIZE), "WoodLight"),)),
+            things=SceneSpec((FreeBody("block0", Box(BLOCK_SIZE), "WoodLight"),)),
             goals=1,
             motions=1,
             level=level,
@@ -153,11 +153,13 @@ class ReachEnv(SubTask[ReachProgress]):
         self._progress = ReachProgress(np.array([goal.dq for goal in goals]), self.control_dt)
         return Start(joints, poses)
 
-    def _legs(self, start: Start) -> list[Leg]:
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
         """From the start to above the block."""
         goals = tuple(above(grasp, HEIGHT) for grasp in block_grasps(start.objects[0]))
         fingertip = Sphere(0.005)
-        return [Leg(self.arms[0].fk(start.joints[0]), goals[0], (goals,), fingertip, Pose.identity(), motion=0)]
+        return [
+            PlacementMotion(self.arms[0].fk(start.joints[0]), goals[0], (goals,), fingertip, Pose.identity(), motion=0)
+        ]
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Sphere(0.012)) for pose in self._goal_pose]

@@ -18,7 +18,7 @@ MAX_OFFSET, MAX_ANGLE = 0.010, float(np.deg2rad(10.0))
 """The hand is at its place within these [m, rad]."""
 
 
-class Verdict(NamedTuple):
+class ReachVerdict(NamedTuple):
     """See `progress.Contacts`."""
 
     unwanted: int
@@ -75,11 +75,13 @@ class ReachProgress(Progress):
     def _there(self) -> bool:
         return self.distance <= MAX_OFFSET and self.angle <= MAX_ANGLE
 
-    def update(self, state: State) -> Verdict:
+    def update(self, state: State) -> ReachVerdict:
         """Take in a new state."""
         here = tuple(float(v) for v in Pose.from_vector(state.tcp_pose[0]).dq)
-        self.distance, self.angle = min((screw.gap(here, goal) for goal in self._goals), key=lambda gap: gap[1])
-        verdict = Verdict(*unwanted_contacts(state.touching))
+        self.distance, self.angle = min(
+            (screw.pose_distance(here, goal) for goal in self._goals), key=lambda gap: gap[1]
+        )
+        verdict = ReachVerdict(*unwanted_contacts(state.touching))
         self._settle(self._there, verdict)
         return verdict
 
@@ -87,6 +89,6 @@ class ReachProgress(Progress):
         """The dense reward of the state taken in last."""
         return 1.0 if self.success else float(closeness(self.distance, self.angle))
 
-    def numbers(self) -> dict[str, Any]:
+    def task_info(self) -> dict[str, Any]:
         """The task's own entries of `info`."""
         return {"position_error": self.distance, "angle_error": self.angle}

@@ -37,7 +37,7 @@ FIRST, WAS_LIFTED = 0, 1
 """Rows of the memory: height of each block at the start, and 1 once it was lifted."""
 
 
-class Verdict(NamedTuple):
+class StackVerdict(NamedTuple):
     """What the compiled judge says of a state; counts and flags as whole numbers.
 
     Attributes:
@@ -96,8 +96,8 @@ def _distance(a, b):
 
 
 @kernel
-def judged(poses, velocities, tcp, touching, goals, memory, errors):
-    """Judge a state: the entries of a `Verdict`.
+def judge_state(poses, velocities, tcp, touching, goals, memory, errors):
+    """Judge a state: the entries of a `StackVerdict`.
 
     Args:
         poses: (n, 7) blocks.
@@ -189,11 +189,13 @@ class StackProgress(Progress):
         """Why it cannot succeed as things are, "" if it can."""
         return self._failure
 
-    def update(self, state: State) -> Verdict:
+    def update(self, state: State) -> StackVerdict:
         """Take in a new state."""
         self._errors = np.empty((2, self.n_blocks))
         poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
-        verdict = Verdict(*judged(poses, moving, tcp, state.touching, self._goals, self._memory, self._errors))
+        verdict = StackVerdict(
+            *judge_state(poses, moving, tcp, state.touching, self._goals, self._memory, self._errors)
+        )
         self.placed, self.held = verdict.placed, verdict.held == 1
         self._settle(verdict.settled == 1, verdict)
         self._best_stage = max(self._best_stage, 2 * verdict.placed + verdict.raised)
@@ -204,7 +206,7 @@ class StackProgress(Progress):
         """The dense reward of the state taken in last."""
         return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
-    def numbers(self) -> dict[str, Any]:
+    def task_info(self) -> dict[str, Any]:
         """The task's own entries of `info`."""
         return {"blocks_placed": self.placed, "position_error": self._errors[0], "yaw_error": self._errors[1]}
 

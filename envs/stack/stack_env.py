@@ -10,10 +10,10 @@ from ...planner.errors import BadOption
 from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import Box
 from ..core.environment import OneDemoEnv
-from ..core.obstacle_placement import Leg, Order
+from ..core.obstacle_placement import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
 from ..scene.robots import robot_named
-from ..scene.scene_objects import Solid, Things
+from ..scene.scene_objects import FreeBody, SceneSpec
 from ..simulation.render import Ghost
 from ..simulation.simulation import Start
 from .grasps import above, block_grasps, block_poses, check_places
@@ -97,7 +97,7 @@ class StackEnv(OneDemoEnv[StackProgress]):
     "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
     `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`,
     `arm=None` (the robot's usual one; Baxter has "right" and "left", of which the other is parked).
-    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `Intruder`), `object_poses` (n, 7),
+    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `ScheduledObstacle`), `object_poses` (n, 7),
     `base_pose` (7,) of the lowest block's goal, and `joint_positions` (7,).
 
     ## Version History
@@ -120,11 +120,11 @@ class StackEnv(OneDemoEnv[StackProgress]):
             raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 1 to 6")
         kind = robot_named(robot)
         kind.check_grip(BLOCK, robot, "a block")
-        blocks = tuple(Solid(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
+        blocks = tuple(FreeBody(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
         super().__init__(
             name="stack",
             robot=robot,
-            things=Things(blocks),
+            things=SceneSpec(blocks),
             goals=n_blocks,
             motions=2 * n_blocks,
             level=level,
@@ -159,10 +159,10 @@ class StackEnv(OneDemoEnv[StackProgress]):
         self._progress = StackProgress(self._goal_pose, poses, self.control_dt)
         return Start(joints, poses)
 
-    def _legs(self, start: Start) -> list[Leg]:
+    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
         """The carries: from above a block to above its place."""
         return [
-            Leg(
+            PlacementMotion(
                 start=above(block_grasps(block)[0], RAISED),
                 end=above(block_grasps(goal)[0], RAISED),
                 keys=tuple(
@@ -175,9 +175,9 @@ class StackEnv(OneDemoEnv[StackProgress]):
             for k, (block, goal) in enumerate(zip(start.objects, self._goal_pose, strict=True))
         ]
 
-    def _paper(self, legs: list[Leg]) -> list[Order]:
+    def _paper(self, legs: list[PlacementMotion]) -> list[ObstacleRequest]:
         """One that swings in front of the last block."""
-        return [Order("moving", len(legs) - 1, PAPER_SPEED)]
+        return [ObstacleRequest("moving", len(legs) - 1, PAPER_SPEED)]
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BLOCK_SIZE)) for pose in self._goal_pose]

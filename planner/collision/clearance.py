@@ -48,7 +48,7 @@ from .robot_arrays import (
 KIND, FIRST, OTHER, GAP, KEEP, NORMAL, T, S = 0, 1, 2, 3, 4, 5, 8, 9
 SELF_MARGIN = 10
 """Column of SETTINGS: distance [m] to keep between capsules of the robot."""
-HAIR = 1e-4
+CREEP_TOLERANCE = 1e-4
 """What a pair that is closer than it should be may come closer still [m], so that it can get away at all."""
 REFINEMENTS = 5
 """A step is looked at in up to 2^5 parts before it is held not to be clear."""
@@ -96,16 +96,16 @@ def capsule_distance(g, world, i, j):
 
 
 @kernel
-def least_room(g, world, seconds, cutoff):
+def min_slack(g, world, seconds, cutoff):
     """Smallest room [m] of all pairs with the capsules at the rows from `world` on; at most the cutoff."""
     least = cutoff
     for k in range(int(g[HEADER, N_OBSTACLES])):
-        keep = g[OBSTACLES + k, MARGIN]
-        if all_beyond(g, world, k, seconds, least + keep):
+        margin = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, world, k, seconds, least + margin):
             continue
         for c in range(int(g[HEADER, N_CAPSULES])):
             if g[BODY + c, B_FRAME] >= 0.0 and not may_touch(g, k, c):
-                least = min(least, obstacle_distance(g, world, c, k, seconds, least + keep) - keep)
+                least = min(least, obstacle_distance(g, world, c, k, seconds, least + margin) - margin)
     first = int(g[HEADER, PAIRS])
     for p in range(first, first + int(g[HEADER, N_PAIRS])):
         least = min(least, capsule_distance(g, world, int(g[p, 0]), int(g[p, 1])) - g[SETTINGS, SELF_MARGIN])
@@ -113,15 +113,15 @@ def least_room(g, world, seconds, cutoff):
 
 
 @kernel
-def room_at(g, q, seconds, cutoff):
+def slack_at(g, q, seconds, cutoff):
     """Smallest room [m] of the robot at joints q after some seconds; at most the cutoff."""
     place_capsules(g, q, NEXT)
-    return least_room(g, NEXT, seconds, cutoff)
+    return min_slack(g, NEXT, seconds, cutoff)
 
 
 @inner
-def _note(g, row, kind, i, j, gap, keep, normal, t, s):
-    g[row, KIND], g[row, FIRST], g[row, OTHER], g[row, GAP], g[row, KEEP] = kind, i, j, gap, keep
+def _note(g, row, kind, i, j, distance, margin, normal, t, s):
+    g[row, KIND], g[row, FIRST], g[row, OTHER], g[row, GAP], g[row, KEEP] = kind, i, j, distance, margin
     for k in range(3):
         g[row, NORMAL + k] = normal[k]
     g[row, T], g[row, S] = t, s
@@ -139,22 +139,22 @@ def find_near(g, shell):
                 continue
             if capsule_beyond(g, WORLD, c, k, 0.0, shell):
                 continue
-            gap, t, normal = closest(g, OBSTACLES + k, g, end_a(g, WORLD + c), end_b(g, WORLD + c))
-            gap -= g[BODY + c, B_RADIUS]
-            if gap > shell:
+            distance, t, normal = closest(g, OBSTACLES + k, g, end_a(g, WORLD + c), end_b(g, WORLD + c))
+            distance -= g[BODY + c, B_RADIUS]
+            if distance > shell:
                 continue
-            _note(g, row, 0.0, c, k, gap, g[OBSTACLES + k, MARGIN], normal, t, 0.0)
-            least, row = min(least, gap - g[OBSTACLES + k, MARGIN]), row + 1
+            _note(g, row, 0.0, c, k, distance, g[OBSTACLES + k, MARGIN], normal, t, 0.0)
+            least, row = min(least, distance - g[OBSTACLES + k, MARGIN]), row + 1
     pair = int(g[HEADER, PAIRS])
     for p in range(pair, pair + int(g[HEADER, N_PAIRS])):
         i, j = int(g[p, 0]), int(g[p, 1])
-        gap, t, s, normal = between_segments(
+        distance, t, s, normal = between_segments(
             end_a(g, WORLD + i), end_b(g, WORLD + i), end_a(g, WORLD + j), end_b(g, WORLD + j)
         )
-        gap -= g[BODY + i, B_RADIUS] + g[BODY + j, B_RADIUS]
-        if gap <= shell:
-            _note(g, row, 1.0, i, j, gap, g[SETTINGS, SELF_MARGIN], normal, t, s)
-            least, row = min(least, gap - g[SETTINGS, SELF_MARGIN]), row + 1
+        distance -= g[BODY + i, B_RADIUS] + g[BODY + j, B_RADIUS]
+        if distance <= shell:
+            _note(g, row, 1.0, i, j, distance, g[SETTINGS, SELF_MARGIN], normal, t, s)
+            least, row = min(least, distance - g[SETTINGS, SELF_MARGIN]), row + 1
     g[HEADER, N_NEAR] = row - first
     return least
 
@@ -177,17 +177,17 @@ def bound_motion(g, world, step):
     start of the step. Not in the paper.
     """
     for c in range(int(g[HEADER, N_CAPSULES])):
-        frame, way = int(g[BODY + c, B_FRAME]), 0.0
+        frame, displacement = int(g[BODY + c, B_FRAME]), 0.0
         first = first_joint(g, c)
         a, b = end_a(g, world + c), end_b(g, world + c)
         for joint in range(frame, first - 1, -1):
             if step[joint] != 0.0:
                 if g[SLIDING, joint] == 1.0:
-                    way += abs(step[joint])
+                    displacement += abs(step[joint])
                 else:
                     square = max(_lever_square(g, joint, a), _lever_square(g, joint, b))
-                    way += abs(step[joint]) * (math.sqrt(square) + way)
-        g[world + c, W_REACH] = way
+                    displacement += abs(step[joint]) * (math.sqrt(square) + displacement)
+        g[world + c, W_REACH] = displacement
 
 
 @kernel
@@ -213,12 +213,12 @@ def _look(g, row, world, seconds):
     if g[row, KIND] == 1.0:
         length, _, _, normal = between_segments(a, b, end_a(g, world + j), end_b(g, world + j))
         return length - g[BODY + i, B_RADIUS] - g[BODY + j, B_RADIUS], normal
-    gap, _, normal = closest(g, OBSTACLES + j, g, shifted(g, j, a, seconds), shifted(g, j, b, seconds))
-    return gap - g[BODY + i, B_RADIUS], normal
+    distance, _, normal = closest(g, OBSTACLES + j, g, shifted(g, j, a, seconds), shifted(g, j, b, seconds))
+    return distance - g[BODY + i, B_RADIUS], normal
 
 
 @inner
-def _other_way(g, row, start, end, normal, dt):
+def _other_displacement(g, row, start, end, normal, dt):
     """How far the other of a pair comes towards the capsule along the normal between two placements [m]."""
     j = int(g[row, OTHER])
     if g[row, KIND] == 1.0:
@@ -229,7 +229,7 @@ def _other_way(g, row, start, end, normal, dt):
 
 
 @inner
-def _pair_stays_clear(g, row, keep, turning, start, dt):
+def _pair_stays_clear(g, row, margin, turning, start, dt):
     """True if a near pair surely keeps its distance while WORLD moves to NEXT, `start` to `start + dt` from now.
 
     Either the two distances are larger than the way in between (Lipschitz), or a plane that separates the pair at
@@ -238,24 +238,27 @@ def _pair_stays_clear(g, row, keep, turning, start, dt):
     Not in the paper.
     """
     i, j = int(g[row, FIRST]), int(g[row, OTHER])
-    way, other = g[WORLD + i, W_REACH], 0.0
+    displacement, other = g[WORLD + i, W_REACH], 0.0
     if g[row, KIND] == 1.0:
-        way += g[WORLD + j, W_REACH]
+        displacement += g[WORLD + j, W_REACH]
     else:
         o = OBSTACLES + j
         other = dt * math.sqrt(g[o, 17] ** 2 + g[o, 18] ** 2 + g[o, 19] ** 2)
-    gap, normal = _look(g, row, WORLD, start)
-    gap_end, normal_end = _look(g, row, NEXT, start + dt)
-    if gap_end < keep or gap < keep:
+    distance, normal = _look(g, row, WORLD, start)
+    distance_end, normal_end = _look(g, row, NEXT, start + dt)
+    if distance_end < margin or distance < margin:
         return False
-    if gap + gap_end - way - other >= 2.0 * keep:
+    if distance + distance_end - displacement - other >= 2.0 * margin:
         return True
-    bend = 0.25 * turning * way
+    bend = 0.25 * turning * displacement
     forth = _farthest_against(g, NEXT, i, normal) - _farthest_against(g, WORLD, i, normal)
-    if min(gap, gap + forth - _other_way(g, row, WORLD, NEXT, normal, dt)) - bend >= keep:
+    if min(distance, distance + forth - _other_displacement(g, row, WORLD, NEXT, normal, dt)) - bend >= margin:
         return True
     back = _farthest_against(g, WORLD, i, normal_end) - _farthest_against(g, NEXT, i, normal_end)
-    return min(gap_end, gap_end + back - _other_way(g, row, NEXT, WORLD, normal_end, -dt)) - bend >= keep
+    return (
+        min(distance_end, distance_end + back - _other_displacement(g, row, NEXT, WORLD, normal_end, -dt)) - bend
+        >= margin
+    )
 
 
 @inner
@@ -278,8 +281,8 @@ def placed_step_stays_clear(g, step, start, dt):
     first = int(g[HEADER, NEAR])
     for row in range(first, first + int(g[HEADER, N_NEAR])):
         # a pair that is already closer than wanted may not come closer than a hair
-        keep = g[row, KEEP] if g[row, GAP] >= g[row, KEEP] else g[row, GAP] - HAIR
-        if not _pair_stays_clear(g, row, keep, turning, start, dt):
+        margin = g[row, KEEP] if g[row, GAP] >= g[row, KEEP] else g[row, GAP] - CREEP_TOLERANCE
+        if not _pair_stays_clear(g, row, margin, turning, start, dt):
             return False
     return True
 
@@ -288,13 +291,13 @@ def placed_step_stays_clear(g, step, start, dt):
 def reach_of(g, step, dt):
     """Distance [m] beyond which no pair can come closer than it must keep during the step; capsules at WORLD."""
     bound_motion(g, WORLD, step)
-    way, fastest, keep = 0.0, 0.0, g[SETTINGS, SELF_MARGIN]
+    displacement, fastest, margin = 0.0, 0.0, g[SETTINGS, SELF_MARGIN]
     for c in range(int(g[HEADER, N_CAPSULES])):
-        way = max(way, g[WORLD + c, W_REACH])
+        displacement = max(displacement, g[WORLD + c, W_REACH])
     for o in range(OBSTACLES, OBSTACLES + int(g[HEADER, N_OBSTACLES])):
         fastest = max(fastest, math.sqrt(g[o, 17] ** 2 + g[o, 18] ** 2 + g[o, 19] ** 2))
-        keep = max(keep, g[o, MARGIN])
-    return keep + max(2.0 * way, way + dt * fastest)
+        margin = max(margin, g[o, MARGIN])
+    return margin + max(2.0 * displacement, displacement + dt * fastest)
 
 
 @kernel
@@ -320,10 +323,10 @@ def step_stays_clear(g, q, step, dt):
 
 
 @kernel
-def room_of_near(g, world, seconds):
+def near_pair_slack(g, world, seconds):
     """Smallest room [m] of the near pairs: as found (world < 0), or with the capsules at other rows, later."""
     first, least = int(g[HEADER, NEAR]), math.inf
     for row in range(first, first + int(g[HEADER, N_NEAR])):
-        gap = g[row, GAP] if world < 0 else _look(g, row, world, seconds)[0]
-        least = min(least, gap - g[row, KEEP])
+        distance = g[row, GAP] if world < 0 else _look(g, row, world, seconds)[0]
+        least = min(least, distance - g[row, KEEP])
     return least

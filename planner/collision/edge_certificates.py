@@ -1,7 +1,7 @@
 """Compiled certificates of a tool's motion between poses: nothing is sampled, every edge is proven clear or not.
 
 The tool is all that moves with the tcp: hand, fingers and what they hold, as capsules. In a work array (see
-`robot_work`) it is a robot without joints whose capsules all sit in frame 0.
+`robot_arrays`) it is a robot without joints whose capsules all sit in frame 0.
 
 - A *slide* keeps the orientation. The distance of two convex bodies is then a convex function of the way, so the
   plane that separates them at one place proves how far the next stretch is clear.
@@ -19,7 +19,7 @@ import numpy as np
 from ..geometry import screw
 from ..geometry.shapes import Packed, pack
 from ..jit import inlined, inner, kernel
-from .clearance import FIRST, GAP, KEEP, NORMAL, OTHER, all_beyond, find_near, least_room, obstacle_distance
+from .clearance import FIRST, GAP, KEEP, NORMAL, OTHER, all_beyond, find_near, min_slack, obstacle_distance
 from .proximity import closest
 from .robot_arrays import (
     B_A,
@@ -37,20 +37,20 @@ from .robot_arrays import (
     OBSTACLES,
     W_REACH,
     WORLD,
-    among,
     end_a,
     end_b,
     lay_capsules,
     may_touch,
     place_frames,
-    robot_work,
+    robot_arrays,
+    with_obstacles,
 )
 
 SMALLEST = 1e-4
 """Way [m] below which a stretch that cannot be proven is held to be blocked."""
 
 
-def tool_work(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = (), margin: float = 0.0) -> np.ndarray:
+def tool_arrays(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = (), margin: float = 0.0) -> np.ndarray:
     """The work array of a tool among obstacles.
 
     Args:
@@ -59,10 +59,10 @@ def tool_work(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = ()
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
         margin: distance [m] to keep from obstacles without one of their own.
     """
-    work = robot_work((), (), pack(()))
+    work = robot_arrays((), (), pack(()))
     work[HEADER, N_CAPSULES] = len(capsules)
     lay_capsules(work[BODY : BODY + len(capsules)], capsules)
-    return among(work, packed, masks, margin)
+    return with_obstacles(work, packed, masks, margin)
 
 
 @inlined
@@ -77,10 +77,10 @@ def place_tool(g, x, world):
 
 
 @kernel
-def tool_room(g, x, cutoff):
+def tool_slack(g, x, cutoff):
     """Smallest room [m] of the tool at a pose; at most the cutoff."""
     place_tool(g, x, NEXT)
-    return least_room(g, NEXT, 0.0, cutoff)
+    return min_slack(g, NEXT, 0.0, cutoff)
 
 
 @inlined
@@ -89,21 +89,21 @@ def _moved(p, delta, s):
 
 
 @inner
-def _pair_slides_clear(g, c, k, delta, keep, s):
+def _pair_slides_clear(g, c, k, delta, margin, s):
     """True if capsule c, placed at WORLD, keeps its distance from obstacle k on a slide from fraction s on."""
     a, b, radius = end_a(g, WORLD + c), end_b(g, WORLD + c), g[BODY + c, B_RADIUS]
     length = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
     for _ in range(64):
-        gap, _, n = closest(g, OBSTACLES + k, g, _moved(a, delta, s), _moved(b, delta, s))
-        room = gap - radius - keep
-        if room < 0.0:
+        distance, _, n = closest(g, OBSTACLES + k, g, _moved(a, delta, s), _moved(b, delta, s))
+        slack = distance - radius - margin
+        if slack < 0.0:
             return False
         slope = n[0] * delta[0] + n[1] * delta[1] + n[2] * delta[2]
-        if slope >= 0.0 or s - room / slope >= 1.0:
+        if slope >= 0.0 or s - slack / slope >= 1.0:
             return True
-        if -room / slope * length < SMALLEST:
+        if -slack / slope * length < SMALLEST:
             return False
-        s -= room / slope
+        s -= slack / slope
     return False
 
 
@@ -112,14 +112,14 @@ def slide_is_clear(g, delta):
     """True if the tool, placed at WORLD with its near pairs found within the slide's length, slides clear."""
     first = int(g[HEADER, NEAR])
     for row in range(first, first + int(g[HEADER, N_NEAR])):
-        room = g[row, GAP] - g[row, KEEP]
+        slack = g[row, GAP] - g[row, KEEP]
         slope = g[row, NORMAL] * delta[0] + g[row, NORMAL + 1] * delta[1] + g[row, NORMAL + 2] * delta[2]
-        if room < 0.0:
+        if slack < 0.0:
             return False
-        if slope >= 0.0 or room + slope >= 0.0:
+        if slope >= 0.0 or slack + slope >= 0.0:
             continue
         c, k = int(g[row, FIRST]), int(g[row, OTHER])
-        if not _pair_slides_clear(g, c, k, delta, g[row, KEEP], -room / slope):
+        if not _pair_slides_clear(g, c, k, delta, g[row, KEEP], -slack / slope):
             return False
     return True
 
@@ -141,7 +141,7 @@ def point_speeds(g, twist):
 
 
 @kernel
-def longest_way(g, x, y):
+def longest_displacement(g, x, y):
     """Longest way [m] of any point of the tool along the screw from pose x to pose y."""
     return point_speeds(g, screw.twist_of(screw.mul(screw.conj(x), y)))
 
@@ -151,17 +151,17 @@ def _stretch(g, left, fastest):
     """Fraction of the screw that is proven clear from the tool at NEXT on; -1 if it is too close already."""
     stretch = left
     for k in range(int(g[HEADER, N_OBSTACLES])):
-        keep = g[OBSTACLES + k, MARGIN]
-        if all_beyond(g, NEXT, k, 0.0, keep + stretch * fastest):
+        margin = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, NEXT, k, 0.0, margin + stretch * fastest):
             continue
         for c in range(int(g[HEADER, N_CAPSULES])):
             speed = g[WORLD + c, W_REACH]
             if not may_touch(g, k, c):
-                room = obstacle_distance(g, NEXT, c, k, 0.0, keep + stretch * speed) - keep
-                if room < 0.0:
+                slack = obstacle_distance(g, NEXT, c, k, 0.0, margin + stretch * speed) - margin
+                if slack < 0.0:
                     return -1.0
-                if room < stretch * speed:
-                    stretch = room / speed
+                if slack < stretch * speed:
+                    stretch = slack / speed
     return stretch
 
 
@@ -170,7 +170,7 @@ def screw_is_clear(g, x, y):
     """True if the tool keeps clear along the screw from pose x to pose y, the shorter way round, ends included."""
     twist = screw.twist_of(screw.mul(screw.conj(x), y))
     for s in (0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
-        if tool_room(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), 0.0) < 0.0:
+        if tool_slack(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), 0.0) < 0.0:
             return False
     fastest, s = point_speeds(g, twist), 0.0
     for _ in range(2000):
@@ -180,7 +180,7 @@ def screw_is_clear(g, x, y):
             return False
         s += stretch
         if s >= 1.0:
-            return tool_room(g, y, 0.0) >= 0.0
+            return tool_slack(g, y, 0.0) >= 0.0
         if stretch * fastest < SMALLEST:
             return False
     return False
@@ -199,5 +199,5 @@ def edge_is_clear(g, x, y):
 def is_clear(g, x, y, widest):
     """True if the tool moves clear from pose x to pose y; `widest` is the largest distance to keep [m]."""
     place_tool(g, x, WORLD)
-    find_near(g, screw.gap(x, y)[0] + widest)
+    find_near(g, screw.pose_distance(x, y)[0] + widest)
     return edge_is_clear(g, x, y)

@@ -138,7 +138,7 @@ def _segment_cylinder(p, d, radius, half):
 
 
 @inner
-def _way_out(rows, k, x, y, z):
+def _exit(rows, k, x, y, z):
     """A direction out of the obstacle for a core point (in its frame) that is inside or on its core."""
     if rows[k, 0] == 2.0:
         dx, dy, dz = rows[k, 14] - abs(x), rows[k, 15] - abs(y), rows[k, 16] - abs(z)
@@ -221,7 +221,7 @@ def closest(rows, k, vertices, a, b):
         normal = unit if kind <= 1.0 else _turned(rows, k, unit)
     else:
         p = _into(rows, k, (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])))
-        normal = _turned(rows, k, _way_out(rows, k, p[0], p[1], p[2]))
+        normal = _turned(rows, k, _exit(rows, k, p[0], p[1], p[2]))
     return (proven if proven >= 0.0 else length) - rows[k, 1], t, normal
 
 

@@ -57,7 +57,7 @@ SEEN_ROOM, SEEN_COUNTS, SEEN_MOVING = 16, 17, 18
 MASK, MARGIN = ROW, ROW + 1
 
 
-def robot_work(
+def robot_arrays(
     arms: Sequence[Arm],
     bodies: Sequence[Body],
     packed: Packed,
@@ -93,11 +93,11 @@ def robot_work(
     if len(pairs):
         work[OBSTACLES:, :2] = pairs
     _lay_arms(work, arms, bodies)
-    return among(work, packed, masks, margin)
+    return with_obstacles(work, packed, masks, margin)
 
 
-def among(robot: np.ndarray, packed: Packed, masks: Sequence[int], margin: float) -> np.ndarray:
-    """The array of a robot, moved among other obstacles; see `robot_work`."""
+def with_obstacles(robot: np.ndarray, packed: Packed, masks: Sequence[int], margin: float) -> np.ndarray:
+    """The array of a robot, moved among other obstacles; see `robot_arrays`."""
     joints, capsules, pairs = (int(robot[HEADER, column]) for column in (N_JOINTS, N_CAPSULES, N_PAIRS))
     k, old = len(packed.rows), int(robot[HEADER, PAIRS])
     near = capsules * k + pairs

@@ -13,7 +13,7 @@ from ..robot.arm import Arm
 from ..robot.body import FRAME, Body
 from ..robot.body_readers import resting_pairs
 from .clearance import capsule_distance
-from .robot_arrays import WORLD, place_capsules, robot_work
+from .robot_arrays import WORLD, place_capsules, robot_arrays
 
 _NOTHING = pack(())
 
@@ -27,18 +27,18 @@ def _gaps(g, q, out):
             out[i, j] = capsule_distance(g, WORLD, i, j)
 
 
-def body_pairs(arm: Arm, body: Body, keep: float) -> list[tuple[int, int]]:
+def body_pairs(arm: Arm, body: Body, margin: float) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of an arm's own capsules that may hit each other.
 
-    Not those in the same or in neighboring frames, which always touch, and not those that are closer than `keep` [m]
+    Not those in the same or in neighboring frames, which always touch, and not those that are closer than `margin` [m]
     with every joint in the middle of its range (at zero if it has none), where real links are not: only the capsules
     are.
     """
     limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
     middle = np.where(limited, 0.5 * (np.where(limited, arm.lower, 0.0) + np.where(limited, arm.upper, 0.0)), 0.0)
     gaps, frames = np.zeros((len(body), len(body))), body.rows[:, FRAME]
-    _gaps(robot_work((arm,), (body,), _NOTHING), middle, gaps)
-    apart = np.triu((np.abs(frames[:, None] - frames[None]) > 1) & (gaps > keep), 1)
+    _gaps(robot_arrays((arm,), (body,), _NOTHING), middle, gaps)
+    apart = np.triu((np.abs(frames[:, None] - frames[None]) > 1) & (gaps > margin), 1)
     return [(int(i), int(j)) for i, j in np.argwhere(apart)]
 
 

@@ -21,7 +21,7 @@ CONTROL, PURSUIT, LIMITS, CHAIN = 51, 52, 53, 56
 """First rows: of the settings, of the limits (lower, upper, speed), of the chain; see `chain` for its rows."""
 
 
-def bound(arm: Arm, control: tuple[float, ...] = (), pursuit: tuple[float, ...] = ()) -> np.ndarray:
+def arm_arrays(arm: Arm, control: tuple[float, ...] = (), pursuit: tuple[float, ...] = ()) -> np.ndarray:
     """A workspace for an arm with packed settings."""
     work = np.zeros((CHAIN + arm.dof + 1, WIDTH))
     work[CONTROL, : len(control)] = control

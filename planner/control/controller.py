@@ -40,7 +40,7 @@ from .arm_arrays import (
     SCRATCH,
     SOLUTION,
     TASK,
-    bound,
+    arm_arrays,
     pose_and_jacobian,
 )
 from .linear import backward_solve, cholesky, forward_solve, gram, smallest_singular_bound
@@ -252,7 +252,7 @@ def joint_velocity(work, q, error, qdot):
     """Joint speeds towards the target; the body Jacobian at q is ready in the workspace.
 
     Args:
-        work: see `workspace.bound`.
+        work: see `workspace.arm_arrays`.
         q: (dof,) joints that the error belongs to.
         error: x_m* x_d as a tuple, its sign chosen.
         qdot: (dof,) result.
@@ -293,7 +293,7 @@ class Controller:
     def __init__(self, arm: Arm, settings: ControllerSettings | None = None):
         self.arm = arm
         self.settings = settings or ControllerSettings()
-        self._work = bound(arm, self.settings.packed())
+        self._work = arm_arrays(arm, self.settings.packed())
         self._sign = 0.0
 
     def reset(self) -> None:

@@ -9,7 +9,7 @@ from ..geometry import screw
 from ..geometry.pose import Pose
 from ..jit import kernel
 from ..robot.arm import Arm
-from .arm_arrays import LIMITS, bound, pose_and_jacobian
+from .arm_arrays import LIMITS, arm_arrays, pose_and_jacobian
 from .controller import ControllerSettings, joint_velocity
 
 POSITION_TOLERANCE, ANGLE_TOLERANCE = 1e-4, 1e-3
@@ -24,7 +24,7 @@ def _solve(work, target, q, iterations, qdot):
     """Move q to a solution; False where it is not reached."""
     for _ in range(iterations):
         x = pose_and_jacobian(work, q)
-        distance, angle = screw.gap(x, target)
+        distance, angle = screw.pose_distance(x, target)
         if distance < POSITION_TOLERANCE and angle < ANGLE_TOLERANCE:
             return True
         joint_velocity(work, q, screw.shorter(screw.mul(screw.conj(x), target)), qdot)
@@ -45,6 +45,6 @@ def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: i
 
 def _unhurried(arm: Arm) -> np.ndarray:
     """A workspace in which an iteration moves no joint by more than half a radian."""
-    work = bound(arm, _STEP)
+    work = arm_arrays(arm, _STEP)
     work[LIMITS + 2] = 0.5
     return work

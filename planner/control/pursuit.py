@@ -9,7 +9,7 @@ along one screw: that is the blend.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..geometry import screw
 from ..geometry.pose import METERS_PER_RADIAN, PosePath
 from ..jit import kernel
 from ..robot.arm import Arm
-from .arm_arrays import LIMITS, PURSUIT, bound, pose_and_jacobian
+from .arm_arrays import LIMITS, PURSUIT, arm_arrays, pose_and_jacobian
 from .controller import ControllerSettings, choose_sign, joint_velocity
 
 PROGRESS, SHARE = 2e-3, 0.1
@@ -41,9 +41,9 @@ class PursuitSettings:
         position_tolerance: arrival [m].
         angle_tolerance: arrival [rad].
         patience: seconds without progress after which it has stalled.
-        rule: "capture" as above, or "paper": the reference advances every tick.
-        pull: "screw": along one screw to the reference; "apart": position straight, orientation by slerp, as where
-            the two are interpolated apart. Not in the paper: what the screw is compared with.
+        advance: "capture" as above, or "paper": the reference advances every tick.
+        interpolation: "screw": along one screw to the reference; "decoupled": position straight, orientation by
+            slerp. Not in the paper: what the screw is compared with.
     """
 
     tau: float = 1.0
@@ -51,16 +51,16 @@ class PursuitSettings:
     position_tolerance: float = 0.001
     angle_tolerance: float = 0.01
     patience: float = 3.0
-    rule: str = "capture"
-    pull: str = "screw"
+    advance: str = field(default="capture", metadata={"formerly": "rule"})
+    interpolation: str = field(default="screw", metadata={"formerly": "pull", "values": {"apart": "decoupled"}})
 
     def __post_init__(self):
         if not 0 < self.tau <= 1:
             raise BadOption("tau", f"{self.tau} is not in (0, 1]")
-        if self.rule not in ("capture", "paper"):
-            raise BadOption("rule", f"{self.rule!r} is not one of capture, paper")
-        if self.pull not in ("screw", "apart"):
-            raise BadOption("pull", f"{self.pull!r} is not one of screw, apart")
+        if self.advance not in ("capture", "paper"):
+            raise BadOption("advance", f"{self.advance!r} is not one of capture, paper")
+        if self.interpolation not in ("screw", "decoupled"):
+            raise BadOption("interpolation", f"{self.interpolation!r} is not one of screw, decoupled")
         for name in ("capture_radius", "position_tolerance", "angle_tolerance", "patience"):
             if not 0 < getattr(self, name) < math.inf:
                 raise BadOption(name, f"{getattr(self, name)} is not a positive number")
@@ -68,7 +68,7 @@ class PursuitSettings:
     def packed(self) -> tuple[float, ...]:
         """The settings as the kernels take them."""
         tolerances = (self.position_tolerance, self.angle_tolerance)
-        choices = float(self.rule == "paper"), float(self.pull == "apart")
+        choices = float(self.advance == "paper"), float(self.interpolation == "decoupled")
         return (self.tau, self.capture_radius, *tolerances, self.patience, *choices)
 
 
@@ -92,41 +92,41 @@ class RollOut(NamedTuple):
     trace: np.ndarray
 
 
-def fresh_memory() -> np.ndarray:
+def fresh_pursuit_state() -> np.ndarray:
     """The memory (4,) of a pursuit that has not begun."""
     return np.array([0.0, 0.0, np.inf, 0.0])
 
 
 @kernel
-def pursue(work, path, q, dt, memory, qdot):
-    """One tick along the path (n, 8): joint speeds into `qdot`, the state of the pursuit in `memory` (4,)."""
+def pursue(work, path, q, dt, pursuit_state, qdot):
+    """One tick along the path (n, 8): joint speeds into `qdot`, the state of the pursuit in `pursuit_state` (4,)."""
     tau, radius, every_tick = work[PURSUIT, 0], work[PURSUIT, 1], work[PURSUIT, 5]
     x = pose_and_jacobian(work, q)
-    before = int(memory[INDEX])
+    before = int(pursuit_state[INDEX])
     index, last = before, len(path) - 1
     while True:
-        distance, angle = screw.gap(x, screw.load8(path, index))
+        distance, angle = screw.pose_distance(x, screw.load8(path, index))
         left = math.hypot(distance, METERS_PER_RADIAN * angle)
         if index == last or every_tick == 1.0 or left > radius:
             break
         index += 1
     if every_tick == 1.0 and index < last:
         index += 1
-    memory[INDEX] = index
+    pursuit_state[INDEX] = index
     for i in range(len(q)):
         qdot[i] = 0.0
     if index == last and distance <= work[PURSUIT, 2] and angle <= work[PURSUIT, 3]:
         return ARRIVED
-    best = memory[BEST]
+    best = pursuit_state[BEST]
     if index > before or left < max(best - PROGRESS, (1.0 - SHARE) * best):
-        memory[BEST], memory[WAITED] = left, 0.0
+        pursuit_state[BEST], pursuit_state[WAITED] = left, 0.0
     else:
-        memory[WAITED] += dt
-        if memory[WAITED] > work[PURSUIT, 4]:
+        pursuit_state[WAITED] += dt
+        if pursuit_state[WAITED] > work[PURSUIT, 4]:
             return STALLED
     error = screw.mul(screw.conj(x), screw.load8(path, index))
-    memory[SIGN] = choose_sign(error, memory[SIGN])
-    if memory[SIGN] < 0.0:
+    pursuit_state[SIGN] = choose_sign(error, pursuit_state[SIGN])
+    if pursuit_state[SIGN] < 0.0:
         error = screw.neg(error)
     if work[PURSUIT, 6] == 1.0:
         p, turn = screw.translation(error), screw.twist_along(error)
@@ -138,14 +138,14 @@ def pursue(work, path, q, dt, memory, qdot):
 
 
 @kernel
-def _roll_out(work, path, q, dt, memory, qdot, trace):
+def _roll_out(work, path, q, dt, pursuit_state, qdot, trace):
     """Follow the whole path from q, which is moved along; status, ticks, smallest joint margin."""
     margin = np.inf
     for count in range(len(trace)):
         for i in range(len(q)):
             trace[count, i] = q[i]
             margin = min(margin, q[i] - work[LIMITS, i], work[LIMITS + 1, i] - q[i])
-        status = pursue(work, path, q, dt, memory, qdot)
+        status = pursue(work, path, q, dt, pursuit_state, qdot)
         if status != FOLLOWING:
             return status, count, margin
         for i in range(len(q)):
@@ -169,25 +169,25 @@ class Pursuit:
         controller = controller or ControllerSettings()
         if not 0 < controller.gain * dt <= 1:
             raise BadOption("gain", f"gain * dt = {controller.gain * dt:g} is not in (0, 1]")
-        self._work = bound(arm, controller.packed(), (settings or PursuitSettings()).packed())
-        self._memory = fresh_memory()
+        self._work = arm_arrays(arm, controller.packed(), (settings or PursuitSettings()).packed())
+        self._pursuit_state = fresh_pursuit_state()
 
     @property
     def index(self) -> int:
         """Index of the reference in the path."""
-        return int(self._memory[INDEX])
+        return int(self._pursuit_state[INDEX])
 
     def step(self, q: ArrayLike) -> tuple[int, np.ndarray]:
         """Status (FOLLOWING, ARRIVED or STALLED) and joint speeds (dof,) at joints q (dof,)."""
         qdot = np.empty(self.arm.dof)
         q = np.ascontiguousarray(q, dtype=np.float64)
-        return pursue(self._work, self.path.dqs, q, self.dt, self._memory, qdot), qdot
+        return pursue(self._work, self.path.dqs, q, self.dt, self._pursuit_state, qdot), qdot
 
     def roll_out(self, q: ArrayLike, max_seconds: float = 60.0) -> RollOut:
         """Follow the whole path with ideal tracking; the pursuit itself is unchanged."""
         q = np.array(q, dtype=np.float64)
         trace = np.empty((round(max_seconds / self.dt) + 1, self.arm.dof))
-        memory, qdot = np.array([0.0, 0.0, np.inf, 0.0]), np.empty(self.arm.dof)
-        status, ticks, margin = _roll_out(self._work, self.path.dqs, q, self.dt, memory, qdot, trace)
+        pursuit_state, qdot = np.array([0.0, 0.0, np.inf, 0.0]), np.empty(self.arm.dof)
+        status, ticks, margin = _roll_out(self._work, self.path.dqs, q, self.dt, pursuit_state, qdot, trace)
         reason = {ARRIVED: "", STALLED: "ik_or_limit", FOLLOWING: "timeout"}[status]
         return RollOut(status == ARRIVED, reason, q, ticks * self.dt, margin, trace[: ticks + 1])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..collision.edge_certificates import is_clear, longest_way, tool_room
+from ..collision.edge_certificates import is_clear, longest_displacement, tool_slack
 from ..geometry import screw
 from ..jit import inner, kernel
 from .escape_tree import (
@@ -32,7 +32,7 @@ from .escape_tree import (
 
 FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
 """The path was clear; detours were found; why not. NODE_LIMIT: a tree was stopped while it still had leaves."""
-LEAST_ROOM = 0.005
+MIN_SLACK = 0.005
 """Room [m] that a root and the way back have at least, where an obstacle's own margin fills the shell."""
 
 FAR_AHEAD = 0.5
@@ -48,35 +48,35 @@ def first_blocked(g, path, count, first, options):
     left = 0.0
     for k in range(first, count - 1):
         x, y = screw.load8(path, k), screw.load8(path, k + 1)
-        if options[ON_SHELL] == 1.0 and tool_room(g, y, 1.0) < max(options[SHELL] - options[WIDEST], LEAST_ROOM):
+        if options[ON_SHELL] == 1.0 and tool_slack(g, y, 1.0) < max(options[SHELL] - options[WIDEST], MIN_SLACK):
             return k
-        way = longest_way(g, x, y)
-        if left <= way:
-            left = tool_room(g, x, FAR_AHEAD)
-        if left <= way and not is_clear(g, x, y, options[WIDEST]):
+        displacement = longest_displacement(g, x, y)
+        if left <= displacement:
+            left = tool_slack(g, x, FAR_AHEAD)
+        if left <= displacement and not is_clear(g, x, y, options[WIDEST]):
             return k
-        left -= way
+        left -= displacement
     return -1
 
 
 @inner
-def _rooms(g, path, count, rooms, cutoff):
+def _slacks(g, path, count, slacks, cutoff):
     """Room [m] at every pose, up to the cutoff."""
     for k in range(count):
-        rooms[k] = tool_room(g, screw.load8(path, k), cutoff)
+        slacks[k] = tool_slack(g, screw.load8(path, k), cutoff)
 
 
 @inner
-def _root(rooms, blocked, enough):
+def _root(slacks, blocked, enough):
     """The pose that the tree starts from: back from the blocked edge while the room is small and still grows."""
     k = blocked
-    while k > 0 and rooms[k] < enough and rooms[k - 1] > rooms[k]:
+    while k > 0 and slacks[k] < enough and slacks[k - 1] > slacks[k]:
         k -= 1
     return k
 
 
 @inner
-def _candidates(path, rooms, count, blocked, enough, most, places, poses):
+def _candidates(path, slacks, count, blocked, enough, most, places, poses):
     """Poses behind the blocked stretch at which the path may go on: their number; indices and poses are written.
 
     The first with enough room, then some later ones, the last pose in the end. Where none has enough, because the
@@ -87,13 +87,13 @@ def _candidates(path, rooms, count, blocked, enough, most, places, poses):
         k = blocked + 1
         # the blocked stretch: the first pose that is not clear, if there is one, then all that are not
         for j in range(blocked + 1, count):
-            if rooms[j] < 0.0:
+            if slacks[j] < 0.0:
                 k = j
                 break
-        while k < count and rooms[k] < wanted:
+        while k < count and slacks[k] < wanted:
             k += 1
         while k < count and size < most:
-            if rooms[k] >= wanted:
+            if slacks[k] >= wanted:
                 places[size] = k
                 size += 1
                 k = count - 1 if size == most - 1 or (k < count - 1 and k + step >= count) else k + step
@@ -136,7 +136,7 @@ def _shortened(g, poses, count, options):
 @kernel
 def write_edge(out, count, x, y, spacing):
     """Append poses from x (excluded) to y (included) at most `spacing` apart; the new number, -1 if out is full."""
-    distance, angle = screw.gap(x, y)
+    distance, angle = screw.pose_distance(x, y)
     steps = max(1, math.ceil(math.hypot(distance, 0.2 * angle) / spacing - 1e-9))
     if count + steps > len(out):
         return -1
@@ -195,15 +195,15 @@ def last_tree(status, detours, most):
 
 
 @kernel
-def escape(g, path, count, out, rooms, places, poses, branch, tree, cells, heap, options, state, log):
+def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap, options, state, log):
     """Lead a path round obstacles.
 
     Args:
-        g: the tool among obstacles, see `edges.tool_work`.
+        g: the tool among obstacles, see `edges.tool_arrays`.
         path: (cap, 8) the path in its first `count` rows; replaced by the result.
         count: number of poses.
         out: (cap, 8) scratch.
-        rooms: (cap,) scratch.
+        slacks: (cap,) scratch.
         places: (c,) scratch.
         poses: (c, 8) scratch.
         branch: (b, 8) scratch.
@@ -217,18 +217,18 @@ def escape(g, path, count, out, rooms, places, poses, branch, tree, cells, heap,
     Returns:
         (status, number of poses, detours).
     """
-    if tool_room(g, screw.load8(path, 0), 1.0) < 0.0:
+    if tool_slack(g, screw.load8(path, 0), 1.0) < 0.0:
         return START_IN_COLLISION, count, 0
-    if tool_room(g, screw.load8(path, count - 1), 1.0) < 0.0:
+    if tool_slack(g, screw.load8(path, count - 1), 1.0) < 0.0:
         return GOAL_IN_COLLISION, count, 0
-    certain, enough = 0, max(options[SHELL] - options[WIDEST], LEAST_ROOM)
+    certain, enough = 0, max(options[SHELL] - options[WIDEST], MIN_SLACK)
     for detour in range(int(options[ROUNDS])):
         blocked = first_blocked(g, path, count, certain, options)
         if blocked < 0:
             return (ESCAPED if detour else FREE), count, detour
-        _rooms(g, path, count, rooms, enough)
-        root = _root(rooms, blocked, enough)
-        size = _candidates(path, rooms, count, blocked, enough, int(options[CANDIDATES]), places, poses)
+        _slacks(g, path, count, slacks, enough)
+        root = _root(slacks, blocked, enough)
+        size = _candidates(path, slacks, count, blocked, enough, int(options[CANDIDATES]), places, poses)
         row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
         log[detour, 0] = rows
         if row < 0:

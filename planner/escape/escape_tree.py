@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from ..collision.clearance import GAP, KEEP, NORMAL, find_near
-from ..collision.edge_certificates import edge_is_clear, place_tool, screw_is_clear, slide_is_clear, tool_room
+from ..collision.edge_certificates import edge_is_clear, place_tool, screw_is_clear, slide_is_clear, tool_slack
 from ..collision.robot_arrays import HEADER, N_NEAR, NEAR, WORLD
 from ..geometry import screw
 from ..jit import inlined, inner, kernel
@@ -152,7 +152,7 @@ def _from_root(tree):
 
 
 @inlined
-def _judge(tree, row, count, y, p, clear, way, home, goal, cells, options, step, attitude, from_root):
+def _judge(tree, row, count, y, p, clear, distance, home, goal, cells, options, step, attitude, from_root):
     """Append a child at pose y, position p, with the verdict on it."""
     verdict, (turn, q) = KEPT, from_root
     if _outside(p, options):
@@ -161,7 +161,7 @@ def _judge(tree, row, count, y, p, clear, way, home, goal, cells, options, step,
         verdict = REJECTED_EDGE
     elif _visited(screw.rotate(turn, (p[0] - q[0], p[1] - q[1], p[2] - q[2])), attitude, options[CELL] * step, cells):
         verdict = VISITED
-    length = tree[row, LENGTH] + way
+    length = tree[row, LENGTH] + distance
     cost = home + (0.0 if options[GOAL_COST] == 1.0 else length)
     for k in range(3):
         cost -= options[BIAS + k] * (p[k] - goal[k])
@@ -173,19 +173,24 @@ def _add_slides(g, tree, row, count, x, plane, goal, cells, options, step, state
     """Children that keep their parent's orientation, and so all that hangs on it; the new number of rows."""
     normal, u, v = plane
     p, q, attitude = screw.translation(x), screw.translation(goal), _attitude_key(tree, x)
-    turn, r, from_root, room = 0.2 * screw.gap(x, goal)[1], (x[0], x[1], x[2], x[3]), _from_root(tree), tree[row, ROOM]
+    turn, r, from_root, slack = (
+        0.2 * screw.pose_distance(x, goal)[1],
+        (x[0], x[1], x[2], x[3]),
+        _from_root(tree),
+        tree[row, ROOM],
+    )
     for k in range(SIDES + int(options[RANDOM])):
         if count >= len(tree):
             break
         d = child_direction(k, normal, u, v, options[SQUARE], options[AWAY], state)
         delta = (step * d[0], step * d[1], step * d[2])
         end = (p[0] + delta[0], p[1] + delta[1], p[2] + delta[2])
-        way = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
+        distance = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
         x_, y_, z_ = q[0] - end[0], q[1] - end[1], q[2] - end[2]
         home = math.sqrt(x_ * x_ + y_ * y_ + z_ * z_ + turn * turn)
-        clear = way < room or slide_is_clear(g, delta)
+        clear = distance < slack or slide_is_clear(g, delta)
         y = screw.from_pose(end, r)
-        _judge(tree, row, count, y, end, clear, way, home, q, cells, options, step, attitude, from_root)
+        _judge(tree, row, count, y, end, clear, distance, home, q, cells, options, step, attitude, from_root)
         count += 1
     return count
 
@@ -210,10 +215,10 @@ def _add_others(g, tree, row, count, x, plane, goal, cells, options, step, state
                 y = _turned_home(x, y, goal, step)
             elif k < SIDES:
                 y = _pulled(g, x, y, normal, options)
-        way, angle = screw.gap(x, y)
-        home, left = screw.gap(y, goal)
+        distance, angle = screw.pose_distance(x, y)
+        home, left = screw.pose_distance(y, goal)
         clear = edge_is_clear(g, x, y)
-        _judge(tree, row, count, y, screw.translation(y), clear, math.hypot(way, 0.2 * angle),
+        _judge(tree, row, count, y, screw.translation(y), clear, math.hypot(distance, 0.2 * angle),
                math.hypot(home, 0.2 * left), q, cells, options, step, _attitude_key(tree, y), from_root)  # fmt: skip
         count += 1
     return count
@@ -231,7 +236,7 @@ def _towards(x, q, step):
 @inner
 def _turned_home(x, y, goal, step):
     """The pose y with the orientation on the screw from x to the goal, in proportion to the way made."""
-    home = screw.gap(x, goal)[0]
+    home = screw.pose_distance(x, goal)[0]
     part = screw.sclerp(x, goal, min(1.0, step / max(home + step, 1e-9)))
     return screw.from_pose(screw.translation(y), (part[0], part[1], part[2], part[3]))
 
@@ -239,10 +244,10 @@ def _turned_home(x, y, goal, step):
 @inner
 def _pulled(g, x, y, normal, options):
     """The child y brought back towards the obstacle of its parent's plane, to the shell."""
-    excess = tool_room(g, y, 10.0) - (options[SHELL] - options[WIDEST])
+    excess = tool_slack(g, y, 10.0) - (options[SHELL] - options[WIDEST])
     if excess <= 0.0:
         return y
-    back = min(excess, 0.5 * screw.gap(x, y)[0])
+    back = min(excess, 0.5 * screw.pose_distance(x, y)[0])
     return _shifted(y, (-back * normal[0], -back * normal[1], -back * normal[2]))
 
 
@@ -284,7 +289,7 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
     for k in range(len(used)):
         used[k] = 0.0
     x = (root[0], root[1], root[2], root[3], root[4], root[5], root[6], root[7])
-    home, turn = screw.gap(x, goal)
+    home, turn = screw.pose_distance(x, goal)
     _add_node(tree, 0, x, -1, KEPT, 0.0, math.hypot(home, 0.2 * turn))
     _visited((0.0, 0.0, 0.0), _attitude_key(tree, x), options[CELL] * step, cells)
     count, size = 1, push(heap, 0, tree[0, SCORE], 0)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..collision.edge_certificates import tool_work
+from ..collision.edge_certificates import tool_arrays
 from ..errors import BadOption, BadShape
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle, pack
@@ -251,7 +251,7 @@ def escape_path(
         raise BadOption("obstacles", f"there are {len(obstacles)}; allowed are {MAX_OBSTACLES}")
     if len(path) > settings.longest:
         raise BadOption("path", f"has {len(path)} poses; allowed are {settings.longest}")
-    work = tool_work(tool, pack(obstacles), masks=masks, margin=settings.distance)
+    work = tool_arrays(tool, pack(obstacles), masks=masks, margin=settings.distance)
     options = settings.packed()
     margins = [settings.distance if o.margin is None else o.margin for o in obstacles]
     options[22] = max([settings.distance, *margins])
@@ -281,7 +281,7 @@ def point_tool(radius: float) -> np.ndarray:
 
 def clear_of(pose: Pose, tool: np.ndarray, obstacles: Sequence[Obstacle]) -> float:
     """Smallest distance [m] of the tool at a pose from obstacles; 1 if they are farther."""
-    from ..collision.edge_certificates import tool_room
+    from ..collision.edge_certificates import tool_slack
 
     bare = [replace(obstacle, margin=None) for obstacle in obstacles]
-    return float(tool_room(tool_work(tool, pack(bare)), tuple(float(v) for v in pose.dq), 1.0))
+    return float(tool_slack(tool_arrays(tool, pack(bare)), tuple(float(v) for v in pose.dq), 1.0))

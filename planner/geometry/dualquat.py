@@ -295,7 +295,7 @@ def pose_error(current: ArrayLike, target: ArrayLike) -> Array:
     return np.minimum(np.linalg.norm(one - z, axis=-1), np.linalg.norm(one + z, axis=-1))
 
 
-def gap(current: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:
+def pose_distance(current: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:
     """Distance of the origins (...) [m] and angle of rotation (...) [rad] between poses; sign-free."""
     z = mul(conj(current), target)
     angle = 2.0 * np.arctan2(np.linalg.norm(z[..., 1:4], axis=-1), np.abs(z[..., 0]))

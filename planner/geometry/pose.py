@@ -139,9 +139,9 @@ class Pose:
         """Composition."""
         return Pose(dq.mul(self.dq, other.dq))
 
-    def gap(self, other: Pose) -> tuple[float, float]:
+    def distance_to(self, other: Pose) -> tuple[float, float]:
         """Distance of the origins [m] and angle of rotation [rad] to another pose."""
-        distance, angle = dq.gap(self.dq, other.dq)
+        distance, angle = dq.pose_distance(self.dq, other.dq)
         return float(distance), float(angle)
 
 
@@ -220,7 +220,7 @@ class PosePath:
 
     def joined(self, other: PosePath) -> PosePath:
         """This path, then another; a first pose equal to our last one is not repeated."""
-        distance, angle = self[-1].gap(other[0])
+        distance, angle = self[-1].distance_to(other[0])
         start = 1 if distance < 1e-9 and angle < 1e-9 else 0
         return PosePath(np.concatenate([self.dqs, other.dqs[start:]]))
 
@@ -229,11 +229,11 @@ class PosePath:
 
         Paper: "length" without a metric; this one is left-invariant, and depends on the body origin.
         """
-        distance, angle = dq.gap(self.dqs[:-1], self.dqs[1:])
+        distance, angle = dq.pose_distance(self.dqs[:-1], self.dqs[1:])
         return np.concatenate([[0.0], np.cumsum(np.hypot(distance, meters_per_radian * angle))])
 
 
 def nearest(path: PosePath, pose: Pose) -> int:
     """Index of the pose of a path that is nearest to a pose."""
-    distance, angle = dq.gap(pose.dq[None], path.dqs)
+    distance, angle = dq.pose_distance(pose.dq[None], path.dqs)
     return int(np.argmin(np.hypot(distance, METERS_PER_RADIAN * angle)))

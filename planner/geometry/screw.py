@@ -195,7 +195,7 @@ def sclerp(a, b, tau):
 
 
 @kernel
-def gap(a, b):
+def pose_distance(a, b):
     """Distance of the origins [m] and angle of the rotation [rad] between two poses."""
     z = mul(conj(a), b)
     t = translation(z)

@@ -53,7 +53,7 @@ def _worst_between(dqs, lengths, first, last, lever):
     whole = lengths[last] - lengths[first]
     for k in range(first + 1, last):
         tau = (lengths[k] - lengths[first]) / whole if whole > 0.0 else 0.0
-        distance, angle = screw.gap(screw.sclerp(a, b, tau), screw.load8(dqs, k))
+        distance, angle = screw.pose_distance(screw.sclerp(a, b, tau), screw.load8(dqs, k))
         off = (distance**2 + (lever * angle) ** 2) ** 0.5
         if off > worst:
             worst, where = off, k

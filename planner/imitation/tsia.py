@@ -113,5 +113,5 @@ def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
     lengths = demonstrated.lengths()
     s = lengths / lengths[-1] if lengths[-1] > STILL else np.linspace(0.0, 1.0, len(demonstrated))
     # one way round for the whole path: the scalar part between the two is the same at every pose
-    way = 1.0 if dq.mul(dq.conj(from_start.dqs[0]), to_goal.dqs[0])[0] >= 0.0 else -1.0
-    return PosePath(dq.sclerp(from_start.dqs, way * to_goal.dqs, s * s * (3.0 - 2.0 * s), shortest=False))
+    sign = 1.0 if dq.mul(dq.conj(from_start.dqs[0]), to_goal.dqs[0])[0] >= 0.0 else -1.0
+    return PosePath(dq.sclerp(from_start.dqs, sign * to_goal.dqs, s * s * (3.0 - 2.0 * s), shortest=False))

@@ -39,9 +39,14 @@ def _pass(
     kinematics: Kinematics, joints: np.ndarray, tool: np.ndarray, path: np.ndarray, pairs: float
 ) -> tuple[float, np.ndarray, float]:
     """Deviation, the points of the path that it was compared with, and the widest gap between points."""
-    ways = [_steps(tool), _steps(path)]
-    spacing = max(FINEST, float(np.sqrt(max(ways[0].sum(), FINEST) * max(ways[1].sum(), FINEST) / pairs)))
-    fractions = [[np.arange(n) / n for n in np.maximum(np.ceil(way / spacing), 1).astype(int)] for way in ways]
+    displacements = [_steps(tool), _steps(path)]
+    spacing = max(
+        FINEST, float(np.sqrt(max(displacements[0].sum(), FINEST) * max(displacements[1].sum(), FINEST) / pairs))
+    )
+    fractions = [
+        [np.arange(n) / n for n in np.maximum(np.ceil(displacement / spacing), 1).astype(int)]
+        for displacement in displacements
+    ]
     dense = [q + s[:, None] * (p - q) for q, p, s in zip(joints[:-1], joints[1:], fractions[0], strict=True)]
     fine = np.concatenate([*dense, joints[-1:]])
     executed = kinematics.moment(np.zeros(len(fine)), fine).tool

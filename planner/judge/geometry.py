@@ -105,7 +105,7 @@ def _turn_of(direction: np.ndarray) -> np.ndarray:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-class Scene:
+class CollisionWorld:
     """Capsules and obstacles in fcl.
 
     A capsule is asked for by its core alone, as a capsule of radius 0, and the radius taken off afterwards: this is

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import BadOption
 from ..log.motion_log import MotionLog
 from ..robot.body import FRAME
-from .geometry import Kinematics, Moment, Scene
+from .geometry import CollisionWorld, Kinematics, Moment
 
 BATCH = 2048
 """Intervals worked on at once: bounds the memory."""
@@ -106,8 +106,8 @@ def travel(kinds: np.ndarray, frames: np.ndarray, a: Moment, b: Moment, shift: n
         arms = moment.ends[:, :, None] - moment.origins[:, None]
         levers = np.cross(moment.axes[:, None], arms)
         far.append(np.linalg.norm(levers, axis=-1))
-        ways = np.where((kinds == 0)[:, None], levers, moment.axes[:, None])
-        velocity = np.einsum("cejx,cj->cex", ways, np.where(active, dq, 0.0)) - shift[:, None]
+        displacements = np.where((kinds == 0)[:, None], levers, moment.axes[:, None])
+        velocity = np.einsum("cejx,cj->cex", displacements, np.where(active, dq, 0.0)) - shift[:, None]
         speeds.append(np.linalg.norm(velocity, axis=-1))
     reach = np.where(kinds == 0, np.maximum(*far), 1.0)
     beyond, bend = np.zeros(reach.shape[:2]), np.zeros(reach.shape[:2])
@@ -136,7 +136,7 @@ class Sweeper:
         self._required, self._aim, self._settings = required, aim, settings
         self._kinds, self._frames = log.arm.chain[:-1, 7], body.rows[:, FRAME].astype(int)
         self._group = np.array([body.names.index(name) for name in body.names], dtype=int)
-        self.kinematics, self._scene = Kinematics(log.arm, body), Scene(body, log.obstacles)
+        self.kinematics, self._scene = Kinematics(log.arm, body), CollisionWorld(body, log.obstacles)
         self.moment = self.kinematics.moment(log.time, log.joints)
         shape = required.shape
         self.found = Sweep(np.full(shape, np.inf), np.full(shape, np.inf), np.full(shape, log.time[0]))
@@ -201,12 +201,12 @@ class Sweeper:
     def _between(self, distances: np.ndarray, exact: np.ndarray) -> list[_Batch]:
         """The intervals between the samples, with the pairs that a coarse bound leaves open."""
         a, b = self.moment.at(slice(None, -1)), self.moment.at(slice(1, None))
-        ways, still = np.empty((len(a.time), len(self._frames))), np.zeros((len(a.time), 3))
+        displacements, still = np.empty((len(a.time), len(self._frames))), np.zeros((len(a.time), 3))
         for k, frame in enumerate(self._frames):
             starts, stops = (m._replace(ends=m.ends[:, k]) for m in (a, b))
-            ways[:, k] = travel(self._kinds, np.full(len(still), frame), starts, stops, still)
+            displacements[:, k] = travel(self._kinds, np.full(len(still), frame), starts, stops, still)
         drift = np.abs(b.time - a.time)[:, None] * np.linalg.norm(self._scene.velocities, axis=1)
-        bound = 0.5 * (distances[:-1] + distances[1:] - ways[:, :, None] - drift[:, None])
+        bound = 0.5 * (distances[:-1] + distances[1:] - displacements[:, :, None] - drift[:, None])
         every = np.column_stack(np.unravel_index(np.arange(bound.size), bound.shape)).reshape(-1, 3)
         opened = bound.ravel() < self._targets(every)
         for side in (0, 1):
@@ -228,9 +228,13 @@ class Sweeper:
         a, b, row = batch.a.at(n), batch.b.at(n), np.arange(len(n))
         shift = self._scene.velocities[o] * (b.time - a.time)[:, None]
         starts, stops = (m._replace(ends=m.ends[row, k]) for m in (a, b))
-        way = travel(self._kinds, self._frames[k], starts, stops, shift)
-        bound = 0.5 * (batch.distances.sum(axis=1) - way)
-        done = (bound >= self._targets(batch.cells)) | (way <= self._settings.resolution) | (not self.found.complete)
+        displacement = travel(self._kinds, self._frames[k], starts, stops, shift)
+        bound = 0.5 * (batch.distances.sum(axis=1) - displacement)
+        done = (
+            (bound >= self._targets(batch.cells))
+            | (displacement <= self._settings.resolution)
+            | (not self.found.complete)
+        )
         self._lower(batch.cells[done], bound[done])
         return done
 

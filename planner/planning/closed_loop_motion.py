@@ -16,8 +16,8 @@ from ..jit import inner, kernel
 from ..safety.guarded_pursuit import guarded_roll_out
 
 IMITATED, GUIDE, FULL, FOLLOWED, LAST, CHANGED, DETOURS, TREE_ROWS = range(8)
-"""What `leg` writes into `counts`: length of the imitated path, guide, length of the path, of the one followed, last
-row of the trace, ticks changed by the safety layer, detours, rows of the last tree."""
+"""What `plan_closed_loop` writes into `counts`: length of the imitated path, guide, length of the path, of the one
+followed, last row of the trace, ticks changed by the safety layer, detours, rows of the last tree."""
 
 
 class Buffers(NamedTuple):
@@ -27,7 +27,7 @@ class Buffers(NamedTuple):
     path: np.ndarray
     followed: np.ndarray
     spare: np.ndarray
-    rooms: np.ndarray
+    slacks: np.ndarray
     places: np.ndarray
     poses: np.ndarray
     branch: np.ndarray
@@ -49,7 +49,7 @@ def buffers(settings: RepetSettings, dof: int, ticks: int) -> Buffers:
         path=np.zeros((settings.longest, 8)),
         followed=np.zeros((settings.longest, 8)),
         spare=np.zeros((settings.longest, 8)),
-        rooms=np.zeros(settings.longest),
+        slacks=np.zeros(settings.longest),
         places=np.zeros(settings.candidates),
         poses=np.zeros((settings.candidates, 8)),
         branch=np.zeros((settings.levels + 3, 8)),
@@ -83,15 +83,15 @@ def _guide(path, n, fraction):
     """Index at which so much of the screw length is behind; `tsia.guide_index`."""
     total = 0.0
     for k in range(1, n):
-        distance, angle = screw.gap(screw.load8(path, k - 1), screw.load8(path, k))
+        distance, angle = screw.pose_distance(screw.load8(path, k - 1), screw.load8(path, k))
         total += math.hypot(distance, METERS_PER_RADIAN * angle)
     if total == 0.0:
         return n - 1
-    way = 0.0
+    length = 0.0
     for k in range(1, n):
-        distance, angle = screw.gap(screw.load8(path, k - 1), screw.load8(path, k))
-        way += math.hypot(distance, METERS_PER_RADIAN * angle)
-        if way >= fraction * total:
+        distance, angle = screw.pose_distance(screw.load8(path, k - 1), screw.load8(path, k))
+        length += math.hypot(distance, METERS_PER_RADIAN * angle)
+        if length >= fraction * total:
             return k
     return n - 1
 
@@ -105,13 +105,13 @@ def _copied(source, first, last, out, at):
 
 
 @kernel
-def leg(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, memory, wish, out):
+def plan_closed_loop(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, pursuit_state, wish, out):
     """Plan a leg: the joints of every tick are left in the trace.
 
     Args:
         work: arm, controller and pursuit, see `workspace`.
-        g: the arm among obstacles, see `robot_work`.
-        tool: the tool among obstacles, see `edges.tool_work`.
+        g: the arm among obstacles, see `robot_arrays`.
+        tool: the tool among obstacles, see `edges.tool_arrays`.
         demo: (n, 8) demonstrated segment.
         goal: (8,) pose to end at.
         lead: (m, 8) how to leave, from the pose at q on; at least that pose.
@@ -120,7 +120,7 @@ def leg(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, memory, wi
         spacing: screw length [m] between poses of the blend.
         dt: seconds per tick.
         b: see `Buffers`.
-        memory: (4,) of the pursuit.
+        pursuit_state: (4,) of the pursuit.
         wish: (dof,) scratch.
         out: (dof,) scratch.
 
@@ -138,7 +138,7 @@ def leg(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, memory, wi
         return -1, 0, -math.inf
     b.log[:] = 0.0
     status, full, counts[DETOURS] = escape(
-        tool, b.path, full, b.spare, b.rooms, b.places, b.poses, b.branch, b.tree, b.cells, b.heap, b.options,
+        tool, b.path, full, b.spare, b.slacks, b.places, b.poses, b.branch, b.tree, b.cells, b.heap, b.options,
         b.state, b.log,
     )  # fmt: skip
     counts[FULL], counts[TREE_ROWS] = full, b.log[last_tree(status, counts[DETOURS], len(b.log)), 0]
@@ -149,9 +149,9 @@ def leg(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, memory, wi
         followed = _copied(lead, 1, len(lead), b.followed, 0)
         followed = _copied(b.imitated, guide, n, b.followed, followed)
     counts[FOLLOWED] = followed
-    memory[0], memory[1], memory[2], memory[3] = 0.0, 0.0, np.inf, 0.0
+    pursuit_state[0], pursuit_state[1], pursuit_state[2], pursuit_state[3] = 0.0, 0.0, np.inf, 0.0
     pursuit, last, margin, changed = guarded_roll_out(
-        work, g, b.followed[:followed], q, dt, memory, wish, out, b.trace, 0
+        work, g, b.followed[:followed], q, dt, pursuit_state, wish, out, b.trace, 0
     )
     counts[LAST], counts[CHANGED] = last, changed
     return status, pursuit, margin

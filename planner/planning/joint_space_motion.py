@@ -9,31 +9,31 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..control.inverse_kinematics import inverse_kinematics
-from ..control.pursuit import ARRIVED, fresh_memory
+from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..geometry.pose import Pose, PosePath
 from ..imitation.tsia import guide_index, imitated_path
 from ..robot.arm import Arm
 from ..safety.guarded_pursuit import guarded_roll_out
 from .joint_space_rrt import connect, shortcut
-from .planning_scene import SceneWork
+from .planning_scene import PlanningScene
 
 if TYPE_CHECKING:
     from .settings import PlanSettings
 
 
-FEWER, FEWEST = 4, 100
+ROUND_SHRINK, MIN_ITERATIONS = 4, 100
 """Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
-MUST = 100.0
+INFEASIBLE_COST = 100.0
 """Cost [rad] of a posture from which what must come next cannot be done."""
-AROUND = 0.5
+SEED_SPREAD = 0.5
 """Spread [rad] of the starts of the inverse kinematics around the nearest posture."""
-STRAY, LOOK = 0.004, 3
+MAX_DEVIATION, CHECK_EVERY = 0.004, 3
 """Distance [m] from its path up to which a strict leg counts as straight; and ticks between looks at it."""
 RAMP = 0.3
 """Seconds from rest to full speed."""
 
 
-class JointLeg(NamedTuple):
+class JointSpaceMotion(NamedTuple):
     """What a search found.
 
     Attributes:
@@ -41,36 +41,36 @@ class JointLeg(NamedTuple):
         path: the part of the demonstrated path that is followed at the end.
         guide: index in the imitated path at which that part begins.
         margin: smallest joint margin [rad].
-        goes_on: what comes next can be done from its end.
+        next_feasible: what comes next can be done from its end.
     """
 
     joints: np.ndarray
     path: PosePath
     guide: int
     margin: float
-    goes_on: bool
+    next_feasible: bool
 
 
-class After(NamedTuple):
+class NextMotionCheck(NamedTuple):
     """What comes after a leg.
 
     Attributes:
         scene: the arm among the obstacles, with the contacts that are wanted then.
         path: of the tcp.
-        must: it must be possible from the end of the leg.
+        required: it must be possible from the end of the leg.
     """
 
-    scene: SceneWork
+    scene: PlanningScene
     path: PosePath
-    must: bool
+    required: bool
 
-    def can_be_done(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
-        """True if it can be followed from joints q (dof,); strictly if it must."""
+    def is_feasible(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
+        """True if it can be followed from joints q (dof,); without detours if it is required."""
         joints, _ = _followed(self.scene, work, self.path, q, settings)
-        return joints is not None and (not self.must or strayed(arm, joints, self.path.dqs) <= STRAY)
+        return joints is not None and (not self.required or path_deviation(arm, joints, self.path.dqs) <= MAX_DEVIATION)
 
 
-def strayed(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
+def path_deviation(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
     """The farthest [m] that the tool is from a path.
 
     Args:
@@ -84,7 +84,7 @@ def strayed(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
         starts, ways = edges, np.zeros((1, 3))
     lengths = np.maximum((ways * ways).sum(axis=1), 1e-12)
     farthest = 0.0
-    for q in joints[::LOOK]:
+    for q in joints[::CHECK_EVERY]:
         from_start = arm.fk(q).position - starts
         part = np.clip((from_start * ways).sum(axis=1) / lengths, 0.0, 1.0)
         farthest = max(farthest, float(np.linalg.norm(from_start - part[:, None] * ways, axis=1).min()))
@@ -98,20 +98,20 @@ class _Posture(NamedTuple):
     tail: np.ndarray
     path: PosePath
     guide: int
-    goes_on: bool
+    next_feasible: bool
 
 
-def joint_leg(
+def plan_joint_space(
     arm: Arm,
-    scene: SceneWork,
+    scene: PlanningScene,
     work: np.ndarray,
     demonstrated: PosePath,
     goal: Pose,
     q: np.ndarray,
     settings: PlanSettings,
-    after: After | None,
+    after: NextMotionCheck | None,
     seed: int,
-) -> JointLeg | None:
+) -> JointSpaceMotion | None:
     """Search a way from joints q (dof,) to the goal; None if none was found.
 
     Args:
@@ -134,7 +134,7 @@ def joint_leg(
     ends = np.empty((2, arm.dof))
     for turn in range(search.rounds):
         later = search.rounds - 1 - turn
-        iterations = max(search.iterations // FEWER**later, min(FEWEST, search.iterations))
+        iterations = max(search.iterations // ROUND_SHRINK**later, min(MIN_ITERATIONS, search.iterations))
         found = _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, search.seeds * 2**turn)
         best, least = None, math.inf
         for posture in sorted(found)[: search.postures]:
@@ -146,12 +146,12 @@ def joint_leg(
                 cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
                 if cost < least:
                     best, least = (out[:count].copy(), posture), cost
-        if best is not None and (least < MUST or later == 0):
+        if best is not None and (least < INFEASIBLE_COST or later == 0):
             points, posture = best
-            way = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
-            joints = np.vstack([way[:-1], posture.tail])
+            timed_joints = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
+            joints = np.vstack([timed_joints[:-1], posture.tail])
             margin = min(arm.margin(row) for row in joints)
-            return JointLeg(joints, posture.path, posture.guide, margin, posture.goes_on)
+            return JointSpaceMotion(joints, posture.path, posture.guide, margin, posture.next_feasible)
     return None
 
 
@@ -173,29 +173,29 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, see
             low, high = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
             guess = home if k == 0 and seeds == search.seeds else rng.uniform(low, high)
             if k % 2 and near is not None:  # around the nearest posture the same elbow is found turned
-                guess = np.clip(near + rng.normal(0.0, AROUND, arm.dof), low, high)
+                guess = np.clip(near + rng.normal(0.0, SEED_SPREAD, arm.dof), low, high)
             solution = inverse_kinematics(arm, path[0], guess, iterations=150)
-            if solution is None or scene.room(solution) < 0.0:
+            if solution is None or scene.slack(solution) < 0.0:
                 continue
             tail, margin = _followed(scene, work, path, solution, settings)
             if tail is None:
                 continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
             cost += search.late * (index - first) / max(last - first, 1)
-            goes_on = after is None or after.can_be_done(arm, work, tail[-1], settings)
-            if not goes_on:
+            next_feasible = after is None or after.is_feasible(arm, work, tail[-1], settings)
+            if not next_feasible:
                 assert after is not None
-                cost += MUST if after.must else 5.0
-            found.append(_Posture(cost, len(found), solution, tail, path, index, goes_on))
+                cost += INFEASIBLE_COST if after.required else 5.0
+            found.append(_Posture(cost, len(found), solution, tail, path, index, next_feasible))
     return found
 
 
 def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]:
     """Joints of following a path from q among the obstacles, or None; and the smallest joint margin."""
     dof, dt = len(q), settings.motion.dt
-    trace, memory = np.empty((round(settings.max_seconds / dt) + 1, dof)), fresh_memory()
+    trace, pursuit_state = np.empty((round(settings.max_seconds / dt) + 1, dof)), fresh_pursuit_state()
     status, last, margin, _ = guarded_roll_out(
-        work, scene.robot, path.dqs, q.copy(), dt, memory, np.empty(dof), np.empty(dof), trace, 0
+        work, scene.robot, path.dqs, q.copy(), dt, pursuit_state, np.empty(dof), np.empty(dof), trace, 0
     )
     return (trace[: last + 1].copy() if status == ARRIVED else None), margin
 

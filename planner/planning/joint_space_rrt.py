@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ..collision.clearance import SELF_MARGIN, all_beyond, bound_motion, capsule_distance, obstacle_distance, room_at
+from ..collision.clearance import SELF_MARGIN, all_beyond, bound_motion, capsule_distance, obstacle_distance, slack_at
 from ..collision.robot_arrays import (
     AFTER,
     B_FRAME,
@@ -42,26 +42,26 @@ def _clear_stretch(g):
     for c in range(int(g[HEADER, N_CAPSULES])):
         longest = max(longest, g[WORLD + c, W_REACH])
     for k in range(int(g[HEADER, N_OBSTACLES])):
-        keep = g[OBSTACLES + k, MARGIN]
-        if all_beyond(g, WORLD, k, 0.0, keep + stretch * longest):
+        margin = g[OBSTACLES + k, MARGIN]
+        if all_beyond(g, WORLD, k, 0.0, margin + stretch * longest):
             continue
         for c in range(int(g[HEADER, N_CAPSULES])):
             if g[BODY + c, B_FRAME] >= 0.0 and not may_touch(g, k, c):
-                way = g[WORLD + c, W_REACH]
-                room = obstacle_distance(g, WORLD, c, k, 0.0, keep + stretch * way) - keep
-                if room < 0.0:
+                displacement = g[WORLD + c, W_REACH]
+                slack = obstacle_distance(g, WORLD, c, k, 0.0, margin + stretch * displacement) - margin
+                if slack < 0.0:
                     return -1.0
-                if room < stretch * way:
-                    stretch = room / way
+                if slack < stretch * displacement:
+                    stretch = slack / displacement
     first = int(g[HEADER, PAIRS])
     for p in range(first, first + int(g[HEADER, N_PAIRS])):
         i, j = int(g[p, 0]), int(g[p, 1])
-        way = g[WORLD + i, W_REACH] + g[WORLD + j, W_REACH]
-        room = capsule_distance(g, WORLD, i, j) - g[SETTINGS, SELF_MARGIN]
-        if room < 0.0:
+        displacement = g[WORLD + i, W_REACH] + g[WORLD + j, W_REACH]
+        slack = capsule_distance(g, WORLD, i, j) - g[SETTINGS, SELF_MARGIN]
+        if slack < 0.0:
             return -1.0
-        if room < stretch * way:
-            stretch = room / way
+        if slack < stretch * displacement:
+            stretch = slack / displacement
     return stretch
 
 
@@ -72,7 +72,7 @@ def joint_edge_is_clear(g, start, end):
     for s in (1.0, 0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
         for i in range(n):
             at[i] = start[i] + s * (end[i] - start[i])
-        if room_at(g, at[:n], 0.0, 0.1) < 0.0:
+        if slack_at(g, at[:n], 0.0, 0.1) < 0.0:
             return False
     s = 0.0
     for _ in range(1000):
@@ -86,10 +86,10 @@ def joint_edge_is_clear(g, start, end):
             return False
         if stretch >= 1.0:
             return True
-        way = 0.0
+        displacement = 0.0
         for c in range(int(g[HEADER, N_CAPSULES])):
-            way = max(way, g[WORLD + c, W_REACH])
-        if stretch * way < SMALLEST:
+            displacement = max(displacement, g[WORLD + c, W_REACH])
+        if stretch * displacement < SMALLEST:
             return False
         s += stretch * (1.0 - s)
     return False
@@ -159,7 +159,7 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
     """A clear path in joint space from start to goal, the number of its points; 0 if none was found.
 
     Args:
-        g: the robot among obstacles, see `robot_work`.
+        g: the robot among obstacles, see `robot_arrays`.
         start: (n,) joints.
         goal: (n,) joints.
         trees: (2, m, n) scratch.
@@ -222,7 +222,7 @@ def shortcut(g, path, count, tries, state, ends):
     """Put clear straight lines in place of stretches of a joint path (count, n), from anywhere to anywhere on it.
 
     Args:
-        g: the robot among obstacles, see `robot_work`.
+        g: the robot among obstacles, see `robot_arrays`.
         path: (m, n), the first `count` rows are the path; changed.
         count: number of its points.
         tries: lines to try.

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..control.arm_arrays import bound
+from ..control.arm_arrays import arm_arrays
 from ..errors import PlanFailed
 from ..escape.detour import GOAL_IN_COLLISION, START_IN_COLLISION
 from ..escape.repet import REASONS, EscapeTree
@@ -30,7 +30,7 @@ from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
 from ..robot.arm import Arm
 from ..robot.body import Body
-from .planning_scene import SceneWork
+from .planning_scene import PlanningScene
 from .refine import SMOOTH_TOLERANCE, retimed, smoothed
 from .settings import PlanSettings
 
@@ -45,21 +45,22 @@ WHY = {
 """Of an escape that was not found: start and goal have been seen to be clear before."""
 
 
-class Onward(NamedTuple):
+class NextMotion(NamedTuple):
     """What comes after a leg, with the same body.
 
     Attributes:
         path: of the tcp.
         allowed: contacts that are wanted then, see `Planner.plan`.
-        must: a leg from whose end it cannot be followed is only a fallback; else such ends are preferred in a search.
+        required: a plan from whose end it cannot be followed is only a fallback; else such ends are preferred in
+            a search.
     """
 
     path: PosePath
     allowed: tuple[tuple[str, str], ...] = ()
-    must: bool = False
+    required: bool = False
 
 
-class Asked(NamedTuple):
+class PlanRequest(NamedTuple):
     """What a plan is the answer to, besides the path.
 
     Attributes:
@@ -81,9 +82,9 @@ class Asked(NamedTuple):
     demonstrated: PosePath | None = None
 
     @property
-    def scene(self) -> SceneWork:
+    def scene(self) -> PlanningScene:
         """The arm among the obstacles."""
-        return SceneWork.of(self.arm, self.body, self.obstacles, self.settings, self.allowed)
+        return PlanningScene.of(self.arm, self.body, self.obstacles, self.settings, self.allowed)
 
 
 class Plan(NamedTuple):
@@ -102,13 +103,13 @@ class Plan(NamedTuple):
         changed: ticks in which the safety layer changed the command.
         tries: closed loops that were tried.
         seconds: that planning took.
-        asked: what it is the answer to.
+        request: what it is the answer to.
         detail: what the reason is in this case; "" if there is no more to say.
         guide: index in the imitated path from which on it was to be followed.
-        kept: share of the imitated path behind the wanted guiding pose that is followed, by screw length; above 1
-            where the way leads along it earlier.
+        imitated_share: share of the imitated path behind the wanted guiding pose that is followed, by path length;
+            above 1 where the plan joins it earlier.
         refined: what has been done to it since: "smooth", "timed".
-        goes_on: what must come next can be followed from its end.
+        next_feasible: what must come next can be followed from its end.
     """
 
     joints: np.ndarray
@@ -123,12 +124,12 @@ class Plan(NamedTuple):
     changed: int
     tries: int
     seconds: float
-    asked: Asked
+    request: PlanRequest
     detail: str = ""
     guide: int = 0
-    kept: float = 1.0
+    imitated_share: float = 1.0
     refined: tuple[str, ...] = ()
-    goes_on: bool = True
+    next_feasible: bool = True
 
     @property
     def success(self) -> bool:
@@ -143,7 +144,7 @@ class Plan(NamedTuple):
     @property
     def end_margin(self) -> float:
         """Distance of the last joints to a joint limit [rad]."""
-        return self.asked.arm.margin(self.joints[-1])
+        return self.request.arm.margin(self.joints[-1])
 
     @property
     def imitated(self) -> PosePath:
@@ -173,12 +174,12 @@ class Plan(NamedTuple):
         self._must_be_there("make smooth")
         if self.how == "joint search":
             raise PlanFailed("plan_failed", "a way through joint space has no path of the tool to make smooth")
-        arm, motion = self.asked.arm, self.asked.settings.motion
+        arm, motion = self.request.arm, self.request.settings.motion
         here = arm.fk(self.joints[0])
         path = PosePath(here.dq[None]).joined(self.path)
-        work = bound(arm, motion.controller.packed(), motion.pursuit.packed())
+        work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
         curve, joints, margin, changed = smoothed(
-            path, self.joints[0], self.asked.scene, work, motion.dt, self.asked.settings.max_seconds, tolerance
+            path, self.joints[0], self.request.scene, work, motion.dt, self.request.settings.max_seconds, tolerance
         )
         return self._replace(
             joints=joints, path_poses=curve.dqs, margin=margin, changed=changed, refined=(*self.refined, "smooth")
@@ -194,8 +195,8 @@ class Plan(NamedTuple):
             PlanFailed: "plan_failed", there is no plan, or the spline between its points is not clear.
         """
         self._must_be_there("time")
-        joints = retimed(self.joints, self.dt, acceleration_limits, self.asked.arm, self.asked.scene).joints
-        margin = min(self.asked.arm.margin(q) for q in joints)
+        joints = retimed(self.joints, self.dt, acceleration_limits, self.request.arm, self.request.scene).joints
+        margin = min(self.request.arm.margin(q) for q in joints)
         # what is timed is no closed loop any more
         return self._replace(joints=joints, margin=margin, changed=0, refined=(*self.refined, "timed"))
 

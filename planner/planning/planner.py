@@ -1,7 +1,7 @@
 """The kinematic plan: one demonstration, a start, a goal and obstacles in, joints for every tick out.
 
-First the whole closed loop in one compiled call (`leg`). Where that does not arrive: other guiding poses, detours
-with other biases and less margin, and at last a search in joint space for a posture from which the rest of the
+First the whole closed loop in one compiled call (`plan_closed_loop`). Where that does not arrive: other guiding poses,
+detours with other biases and less margin, and at last a search in joint space for a posture from which the rest of the
 demonstrated path can be followed. Every step of what comes back with success is proven clear of all obstacles for
 the whole arm. Not in the paper, which plans for the end effector's point.
 """
@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..control.arm_arrays import bound
+from ..control.arm_arrays import arm_arrays
 from ..control.pursuit import ARRIVED
 from ..errors import BadOption
 from ..escape.detour import ESCAPED, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
@@ -41,22 +41,22 @@ from .closed_loop_motion import (
     TREE_ROWS,
     Buffers,
     buffers,
-    leg,
+    plan_closed_loop,
 )
-from .joint_space_motion import After, joint_leg, strayed
-from .plan import WHY, Asked, Onward, Plan, Problem
-from .planning_scene import Layout, SceneWork, checked_obstacles
+from .joint_space_motion import NextMotionCheck, path_deviation, plan_joint_space
+from .plan import WHY, NextMotion, Plan, PlanRequest, Problem
+from .planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from .settings import PlanSettings
 
 
 class _Run(NamedTuple):
     """One call of `Planner.plan`: what was asked, the arm among obstacles, demonstration, joints, what comes next."""
 
-    asked: Asked
-    scene: SceneWork
+    request: PlanRequest
+    scene: PlanningScene
     demonstrated: PosePath
     q: np.ndarray
-    after: After | None
+    after: NextMotionCheck | None
 
 
 class Planner:
@@ -72,15 +72,15 @@ class Planner:
         self.arm, self.settings = arm, settings or PlanSettings()
         self.hold(body)
         motion = self.settings.motion
-        self._work = bound(arm, motion.controller.packed(), motion.pursuit.packed())
+        self._work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
         self._buffers: Buffers = buffers(self.settings.repet, arm.dof, round(self.settings.max_seconds / motion.dt))
-        self._memory, self._wish, self._out = np.zeros(4), np.empty(arm.dof), np.empty(arm.dof)
+        self._pursuit_state, self._wish, self._out = np.zeros(4), np.empty(arm.dof), np.empty(arm.dof)
 
     def hold(self, body: Body) -> None:
         """The body from now on: after something was grasped or released."""
         self.body = body
         settings = self.settings
-        self._layout = Layout(self.arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
+        self._template = SceneTemplate(self.arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
 
     def plan(
         self,
@@ -91,7 +91,7 @@ class Planner:
         *,
         allowed: Sequence[tuple[str, str]] = (),
         leaving: PosePath | None = None,
-        onward: Onward | None = None,
+        next_motion: NextMotion | None = None,
         seed: int = 0,
     ) -> Plan:
         """Plan a leg.
@@ -103,19 +103,19 @@ class Planner:
             obstacles: as they are now; they are taken to stand still.
             allowed: pairs of names (part of the body or held object, obstacle) that may touch.
             leaving: how to leave, from the pose at `start` on; None: blend at once.
-            onward: what comes next; see `Onward`.
+            next_motion: what comes next; see `NextMotion`.
             seed: of all random choices; the same seed gives the same plan.
         """
         begun = time.perf_counter()
         q = self.arm.checked(start)
-        scene = SceneWork(self._layout, checked_obstacles(obstacles), self.settings.repet.distance, allowed)
-        asked = Asked(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings, demonstrated)
-        run = _Run(asked, scene, demonstrated, q, self._after(scene, asked, onward))
+        scene = PlanningScene(self._template, checked_obstacles(obstacles), self.settings.repet.distance, allowed)
+        request = PlanRequest(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings, demonstrated)
+        run = _Run(request, scene, demonstrated, q, self._after(scene, request, next_motion))
         reason, detail = self._unfit(scene, q, goal)
         if reason:
             return self._failed(run, reason, detail)
         best, tries = self._followed(run, leaving.dqs.copy() if leaving is not None else self._pose(q)[None], seed)
-        if not best.success or best.end_margin < self.settings.end_margin or not best.goes_on:
+        if not best.success or best.end_margin < self.settings.end_margin or not best.next_feasible:
             best = self._searched(run, best, seed)
         return best._replace(tries=tries, seconds=time.perf_counter() - begun)
 
@@ -127,12 +127,12 @@ class Planner:
                 if extra == 0:
                     break
                 extra -= 1
-            status, pursuit, margin = self._leg(run, lead, attempt, seed)
+            status, pursuit, margin = self._closed_loop(run, lead, attempt, seed)
             escapes.append(status)
             if pursuit == ARRIVED and self._is_straight():
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
-                found = found._replace(goes_on=self._goes_on(run, found.joints[-1]))
+                found = found._replace(next_feasible=self._next_is_feasible(run, found.joints[-1]))
                 if self._is_good(found) or self.settings.effort == 0:
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
@@ -149,62 +149,70 @@ class Planner:
         settings = self.settings
         if settings.search is None or not settings.avoid or (best.success and settings.effort == 0):
             return best
-        if best.success and best.goes_on:
+        if best.success and best.next_feasible:
             rounds = min(settings.search.rounds, settings.effort)
             settings = replace(settings, search=replace(settings.search, rounds=rounds))
-        found = joint_leg(
-            self.arm, run.scene, self._work, run.demonstrated, run.asked.goal, run.q, settings, run.after, seed
+        found = plan_joint_space(
+            self.arm, run.scene, self._work, run.demonstrated, run.request.goal, run.q, settings, run.after, seed
         )
         if found is None:
             return best
-        imitated = imitated_path(run.demonstrated, run.asked.goal)
+        imitated = imitated_path(run.demonstrated, run.request.goal)
         plan = Plan(
             found.joints, settings.motion.dt, "", "joint search", imitated.dqs, found.path.dqs, self._buffers.tree[:0],
-            0, found.margin, 0, 0, 0.0, run.asked, "", found.guide,
-            _kept(imitated.dqs, found.path.dqs, settings.motion.guide),
-            goes_on=found.goes_on or run.after is None or not run.after.must,
+            0, found.margin, 0, 0, 0.0, run.request, "", found.guide,
+            _imitated_share(imitated.dqs, found.path.dqs, settings.motion.guide),
+            next_feasible=found.next_feasible or run.after is None or not run.after.required,
         )  # fmt: skip
         return _better(best, plan) if best.success else plan
 
     def _is_good(self, plan: Plan) -> bool:
         settings = self.settings
-        return plan.kept >= settings.keep and plan.end_margin >= settings.end_margin and plan.goes_on
+        return (
+            plan.imitated_share >= settings.min_imitated_share
+            and plan.end_margin >= settings.end_margin
+            and plan.next_feasible
+        )
 
     def _is_straight(self) -> bool:
         """True if the tool has kept as near to what it has followed as it must."""
-        b, counts, stray = self._buffers, self._buffers.counts, self.settings.stray
-        if math.isinf(stray):
+        b, counts, max_deviation = self._buffers, self._buffers.counts, self.settings.max_deviation
+        if math.isinf(max_deviation):
             return True
         joints = b.trace[: counts[LAST] + 1]
         path = np.vstack([self._pose(joints[0]), b.followed[: counts[FOLLOWED]]])
-        return strayed(self.arm, joints, path) <= stray
+        return path_deviation(self.arm, joints, path) <= max_deviation
 
-    def _after(self, scene: SceneWork, asked: Asked, onward: Onward | None) -> After | None:
-        if onward is None:
+    def _after(
+        self, scene: PlanningScene, request: PlanRequest, next_motion: NextMotion | None
+    ) -> NextMotionCheck | None:
+        if next_motion is None:
             return None
-        if onward.must:
-            scene = SceneWork(self._layout, asked.obstacles, self.settings.repet.distance, onward.allowed)
-        return After(scene, onward.path, onward.must)
+        if next_motion.required:
+            scene = PlanningScene(self._template, request.obstacles, self.settings.repet.distance, next_motion.allowed)
+        return NextMotionCheck(scene, next_motion.path, next_motion.required)
 
-    def _goes_on(self, run: _Run, q: np.ndarray) -> bool:
+    def _next_is_feasible(self, run: _Run, q: np.ndarray) -> bool:
         """True if what must come next can be done from joints q."""
-        return run.after is None or not run.after.must or run.after.can_be_done(self.arm, self._work, q, self.settings)
+        return (
+            run.after is None or not run.after.required or run.after.is_feasible(self.arm, self._work, q, self.settings)
+        )
 
     def _pose(self, q: np.ndarray) -> np.ndarray:
         out = np.empty(8)
         forward_into(self.arm.chain, q, np.empty((self.arm.dof, FRAME)), out)
         return out
 
-    def _unfit(self, scene: SceneWork, q: np.ndarray, goal: Pose) -> tuple[str, str]:
+    def _unfit(self, scene: PlanningScene, q: np.ndarray, goal: Pose) -> tuple[str, str]:
         """Why start or goal cannot be, and what in this case; "" if they can."""
         if self.arm.margin(q) < 0.0:
             margins = np.minimum(q - self.arm.lower, self.arm.upper - q)
             joint = int(np.argmin(margins))
             return "start beyond a joint limit", f"{self.arm.joint_names[joint]} by {-margins[joint]:.3f} rad"
-        if self.settings.guard and scene.room(q) < 0.0:
+        if self.settings.guard and scene.slack(q) < 0.0:
             return "start in collision", str(scene.tightest(q))
         # what neither plans round anything nor is guarded does not look
-        if (self.settings.guard or self.settings.avoid) and scene.tool_room(goal) < 0.0:
+        if (self.settings.guard or self.settings.avoid) and scene.tool_slack(goal) < 0.0:
             return "goal in collision", str(scene.tightest_of_tool(goal))
         return "", ""
 
@@ -214,12 +222,12 @@ class Planner:
         if status == START_IN_COLLISION:
             return str(run.scene.tightest_of_tool(Pose(self._pose(run.q)), factor))
         if status == GOAL_IN_COLLISION:
-            return str(run.scene.tightest_of_tool(run.asked.goal, factor))
+            return str(run.scene.tightest_of_tool(run.request.goal, factor))
         if status == NODE_LIMIT:
             return f"a tree had {repet.nodes} nodes, see repet.nodes"
         return f"{rows} nodes in the last of {repet.retries + 1} trees" if status == NO_ESCAPE else ""
 
-    def _leg(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
+    def _closed_loop(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
         b, motion, repet = self._buffers, self.settings.motion, self.settings.repet
         tool = run.scene.tool(attempt.factor)
         b.options[:] = (repet if attempt.bias == repet.bias else replace(repet, bias=attempt.bias)).packed()
@@ -229,9 +237,9 @@ class Planner:
         if not self.settings.avoid:
             b.options[ROUNDS] = 0.0
         b.state[0] = float(seed % 2147483646) + 1.0
-        return leg(
-            self._work, run.scene.robot, tool, run.demonstrated.dqs, run.asked.goal.dq, lead, run.q.copy(),
-            attempt.guide, self.settings.spacing, motion.dt, b, self._memory, self._wish, self._out,
+        return plan_closed_loop(
+            self._work, run.scene.robot, tool, run.demonstrated.dqs, run.request.goal.dq, lead, run.q.copy(),
+            attempt.guide, self.settings.spacing, motion.dt, b, self._pursuit_state, self._wish, self._out,
         )  # fmt: skip
 
     def _plan(self, run: _Run, how: str, margin: float, attempt: Attempt) -> Plan:
@@ -251,9 +259,9 @@ class Planner:
             int(counts[CHANGED]),
             0,
             0.0,
-            run.asked,
+            run.request,
             guide=int(counts[GUIDE]),
-            kept=1.0 if whole else _kept(imitated, path, guide),
+            imitated_share=1.0 if whole else _imitated_share(imitated, path, guide),
         )
 
     def _failed(self, run: _Run, reason: str, detail: str, *, tried: bool = False) -> Plan:
@@ -261,12 +269,12 @@ class Planner:
         path = b.path[: counts[FULL]].copy() if counts[FULL] else run.demonstrated.dqs
         tree, dt = b.tree[: counts[TREE_ROWS]].copy(), self.settings.motion.dt
         return Plan(
-            run.q[None], dt, reason, "", run.demonstrated.dqs, path, tree, 0, -np.inf, 0, 0, 0.0, run.asked, detail,
-            kept=0.0,
+            run.q[None], dt, reason, "", run.demonstrated.dqs, path, tree, 0, -np.inf, 0, 0, 0.0, run.request, detail,
+            imitated_share=0.0,
         )  # fmt: skip
 
 
-def _kept(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
+def _imitated_share(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
     """Screw length of the imitated path's (n, 8) edges that are in a path (m, 8), over that behind the guiding pose.
 
     Bit by bit: what is followed is copied.
@@ -283,7 +291,7 @@ def _kept(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
 
 def _better(one: Plan, other: Plan) -> Plan:
     """The plan that can go on, that keeps more of the demonstration; of those that keep as much, the freer end."""
-    return max((one, other), key=lambda plan: (plan.goes_on, round(plan.kept, 1), plan.end_margin))
+    return max((one, other), key=lambda plan: (plan.next_feasible, round(plan.imitated_share, 1), plan.end_margin))
 
 
 def plan(

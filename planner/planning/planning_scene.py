@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..collision.clearance import FIRST, GAP, KEEP, KIND, OTHER, SELF_MARGIN, find_near, room_at
-from ..collision.edge_certificates import tool_room, tool_work
+from ..collision.clearance import FIRST, GAP, KEEP, KIND, OTHER, SELF_MARGIN, find_near, slack_at
+from ..collision.edge_certificates import tool_arrays, tool_slack
 from ..collision.robot_arrays import (
     FRAMES,
     HEADER,
@@ -22,10 +22,10 @@ from ..collision.robot_arrays import (
     SEEN_MOVING,
     SETTINGS,
     WORLD,
-    among,
     place_capsules,
     place_frames,
-    robot_work,
+    robot_arrays,
+    with_obstacles,
 )
 from ..collision.self_collision import body_pairs
 from ..errors import BadOption
@@ -57,23 +57,23 @@ class Tightest(NamedTuple):
     Attributes:
         part: name of the part of the body, or of what it holds.
         other: name of the obstacle, or of another part; "obstacle 3", counted from 0, if it has none.
-        gap: distance between them [m], negative inside.
-        keep: distance that they must keep [m].
+        distance: distance between them [m], negative inside.
+        margin: distance that they must keep [m].
     """
 
     part: str
     other: str
-    gap: float
-    keep: float
+    distance: float
+    margin: float
 
     def __str__(self) -> str:
         """For messages."""
-        if self.gap <= 0.0:
+        if self.distance <= 0.0:
             return f"{self.part} touches {self.other}"
-        return f"{self.part} is {1e3 * self.gap:.1f} mm from {self.other}, which must be {1e3 * self.keep:.1f}"
+        return f"{self.part} is {1e3 * self.distance:.1f} mm from {self.other}, which must be {1e3 * self.margin:.1f}"
 
 
-class Layout:
+class SceneTemplate:
     """What of the work arrays belongs to the arm and its body: made once, copied for every scene.
 
     Without a guard the arm that follows a path is among nothing: it is not held back by what is there.
@@ -85,12 +85,12 @@ class Layout:
         self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
         self.tool_names = tuple(body.names[row] for row in self.at_tool)
         pairs = body_pairs(arm, body, safety.self_distance)
-        self.robot = robot_work((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
-        self.alone = None if guard else robot_work((arm,), (body,), nothing, settings=safety.packed(dt))
-        self.tool = tool_work(body.tool(arm), nothing)
+        self.robot = robot_arrays((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
+        self.alone = None if guard else robot_arrays((arm,), (body,), nothing, settings=safety.packed(dt))
+        self.tool = tool_arrays(body.tool(arm), nothing)
 
 
-class SceneWork:
+class PlanningScene:
     """The work arrays of an arm among obstacles: `robot` for the whole arm, `tool(factor)` for the tool.
 
     `seen` is the whole arm among them for queries, also where the layout has no guard and `robot` is among nothing.
@@ -104,19 +104,21 @@ class SceneWork:
 
     def __init__(
         self,
-        layout: Layout,
+        layout: SceneTemplate,
         obstacles: Sequence[Obstacle],
         distance: float,
         allowed: Sequence[tuple[str, str]] = (),
     ):
         packed, self._distance = pack(obstacles), distance
-        self._layout = layout
+        self._template = layout
         self._names = [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(obstacles)]
         masks = contact_masks(layout.names, obstacles, allowed)
-        self.seen = among(layout.robot, packed, masks, layout.safety.distance)
-        self.robot = self.seen if layout.alone is None else among(layout.alone, pack(()), (), layout.safety.distance)
+        self.seen = with_obstacles(layout.robot, packed, masks, layout.safety.distance)
+        self.robot = (
+            self.seen if layout.alone is None else with_obstacles(layout.alone, pack(()), (), layout.safety.distance)
+        )
         tool_masks = [sum(1 << k for k, row in enumerate(layout.at_tool) if mask >> int(row) & 1) for mask in masks]
-        self._tool = among(layout.tool, packed, tool_masks, distance)
+        self._tool = with_obstacles(layout.tool, packed, tool_masks, distance)
         self._margins = self._tool[OBSTACLES : OBSTACLES + len(obstacles), MARGIN]
         self._own = packed.rows[:, 23] >= 0.0
         self.robot_distance = layout.safety.distance
@@ -128,10 +130,10 @@ class SceneWork:
         obstacles: Sequence[Obstacle],
         settings: PlanSettings,
         allowed: Sequence[tuple[str, str]] = (),
-    ) -> SceneWork:
+    ) -> PlanningScene:
         """The arrays for the distances of these settings, laid out anew."""
-        layout = Layout(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
-        return SceneWork(layout, checked_obstacles(obstacles), settings.repet.distance, allowed)
+        layout = SceneTemplate(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
+        return PlanningScene(layout, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
     def move(self, obstacles: Sequence[Obstacle]) -> None:
         """The same obstacles at other places, with other velocities."""
@@ -149,13 +151,13 @@ class SceneWork:
         """Largest distance to keep [m] in the tool's array."""
         return max([factor * self._distance, *self._margins[self._own]])
 
-    def room(self, q: np.ndarray) -> float:
+    def slack(self, q: np.ndarray) -> float:
         """Room [m] of the whole arm at joints q (dof,), up to 1 m."""
-        return float(room_at(self.seen, q, 0.0, 1.0))
+        return float(slack_at(self.seen, q, 0.0, 1.0))
 
-    def tool_room(self, pose: Pose) -> float:
+    def tool_slack(self, pose: Pose) -> float:
         """Room [m] of the tool at a pose of the tcp, with the safety distance, up to 1 m."""
-        return float(tool_room(self.safe_tool(), tuple(float(value) for value in pose.dq), 1.0))
+        return float(tool_slack(self.safe_tool(), tuple(float(value) for value in pose.dq), 1.0))
 
     def safe_tool(self) -> np.ndarray:
         """The tool's array with the safety distance in place of the planning distance."""
@@ -173,14 +175,14 @@ class SceneWork:
     def tightest(self, q: np.ndarray) -> Tightest | None:
         """The pair of the whole arm with least room at joints q (dof,); None if nothing is within its distance."""
         place_capsules(self.seen, q, WORLD)
-        return self._tightest(self.seen, self._layout.names)
+        return self._tightest(self.seen, self._template.names)
 
     def tightest_of_tool(self, pose: Pose, factor: float | None = None) -> Tightest | None:
         """The pair of the tool with least room at a pose; with the safety distance, or a factor of the planning one."""
         work = self.safe_tool() if factor is None else self.tool(factor)
         work[FRAMES, 3:6], work[FRAMES, 6:10] = pose.position, pose.dq[:4]
         place_frames(work, WORLD)
-        return self._tightest(work, self._layout.tool_names)
+        return self._tightest(work, self._template.tool_names)
 
     def meets_mover(self) -> bool:
         """True if an obstacle that moves is among the near pairs of the whole arm that were found last."""
@@ -200,7 +202,7 @@ class SceneWork:
 
     def tightest_seen(self, work: np.ndarray | None = None, names: Sequence[str] = ()) -> Tightest | None:
         """The same of the near pairs that were found last; None if there were none."""
-        work, names = (self.robot, self._layout.names) if work is None else (work, names)
+        work, names = (self.robot, self._template.names) if work is None else (work, names)
         near = self._near(work)
         if not len(near):
             return None

@@ -19,7 +19,7 @@ from ..geometry.smooth_path import smooth, thinned
 from ..robot.arm import Arm
 from ..safety.guarded_pursuit import guarded_roll_out
 from .joint_space_rrt import joint_edge_is_clear
-from .planning_scene import SceneWork
+from .planning_scene import PlanningScene
 from .time_optimal import TimedPath, timed
 
 SMOOTH_TOLERANCE = 0.002
@@ -28,7 +28,7 @@ CURVE_SPACING = 0.005
 """Screw length [m] between poses of a curve."""
 
 
-def retimed(joints: np.ndarray, dt: float, acceleration_limits: ArrayLike, arm: Arm, scene: SceneWork) -> TimedPath:
+def retimed(joints: np.ndarray, dt: float, acceleration_limits: ArrayLike, arm: Arm, scene: PlanningScene) -> TimedPath:
     """Joints (t, dof) on a C2 spline, as fast as velocity and acceleration limits allow, from rest to rest.
 
     Args:
@@ -57,7 +57,7 @@ def smooth_clear_path(
 
     Args:
         path: proven clear as it is, like `Escape.path`.
-        tool: the tool among obstacles, see `edges.tool_work`.
+        tool: the tool among obstacles, see `edges.tool_arrays`.
         widest: largest distance to keep [m] in it.
         tolerance: screw length [m] that poses of the path may be away from those the curve is laid through.
         spacing: screw length [m] between poses of the curve.
@@ -76,7 +76,13 @@ def smooth_clear_path(
 
 
 def smoothed(
-    path: PosePath, start: np.ndarray, scene: SceneWork, work: np.ndarray, dt: float, seconds: float, tolerance: float
+    path: PosePath,
+    start: np.ndarray,
+    scene: PlanningScene,
+    work: np.ndarray,
+    dt: float,
+    seconds: float,
+    tolerance: float,
 ) -> tuple[PosePath, np.ndarray, float, int]:
     """A motion along a smooth path: the curve, the joints of every tick, smallest joint margin, ticks changed.
 
@@ -93,10 +99,10 @@ def smoothed(
         PlanFailed: "plan_failed", the curve is not clear, or the arm does not follow it to its end.
     """
     curve = smooth_clear_path(path, scene.safe_tool(), scene.widest_safe, tolerance=tolerance)
-    dof, memory = len(start), np.array([0.0, 0.0, np.inf, 0.0])
+    dof, pursuit_state = len(start), np.array([0.0, 0.0, np.inf, 0.0])
     trace = np.empty((round(seconds / dt) + 1, dof))
     status, last, margin, changed = guarded_roll_out(
-        work, scene.robot, curve.dqs, start.copy(), dt, memory, np.empty(dof), np.empty(dof), trace, 0
+        work, scene.robot, curve.dqs, start.copy(), dt, pursuit_state, np.empty(dof), np.empty(dof), trace, 0
     )
     if status != ARRIVED:
         raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * dt:.2f} s")

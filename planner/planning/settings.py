@@ -94,8 +94,8 @@ class PlanSettings:
         search: the search in joint space; None for none.
         biases: what detours are tried for, one after the other; see `RepetSettings.bias`.
         tight: factor of the planning margin in the second half of the tries.
-        keep: share of the demonstrated path behind the wanted guiding pose that a plan must follow to be taken at
-            once; one that comes back to it later, is a fallback.
+        min_imitated_share: share of the demonstrated path behind the wanted guiding pose that a plan must
+            follow to be taken at once; one that comes back to it later, is a fallback.
         end_margin: distance to a joint limit [rad] that the last joints must have for the same, so that the next
             leg has somewhere to go.
         effort: most closed loops that are tried in search of something better than a fallback, and rounds of the
@@ -103,7 +103,7 @@ class PlanSettings:
         spacing: screw length [m] between poses of a blend.
         max_seconds: longest motion.
         avoid: False: no detours and no search, the safety layer alone.
-        stray: distance [m] from what it follows that the tool may be led away by the safety layer.
+        max_deviation: distance [m] from what it follows that the tool may be led away by the safety layer.
         guard: False: no safety layer; what is returned with success is then proven clear for the tool at most.
     """
 
@@ -113,26 +113,26 @@ class PlanSettings:
     search: JointSearchSettings | None = field(default_factory=JointSearchSettings)
     biases: tuple[Corner, ...] = BIASES
     tight: float = 0.7
-    keep: float = 0.4
+    min_imitated_share: float = field(default=0.4, metadata={"formerly": "keep"})
     end_margin: float = 0.05
     effort: int = 3
     spacing: float = 0.01
     max_seconds: float = 30.0
     avoid: bool = True
-    stray: float = math.inf
+    max_deviation: float = field(default=math.inf, metadata={"formerly": "stray"})
     guard: bool = True
 
     def __post_init__(self):
         if not 0.0 < self.tight <= 1.0:
             raise BadOption("tight", f"{self.tight} is not in (0, 1]")
-        if not 0.0 <= self.keep <= 1.0:
-            raise BadOption("keep", f"{self.keep} is not from 0 to 1")
+        if not 0.0 <= self.min_imitated_share <= 1.0:
+            raise BadOption("min_imitated_share", f"{self.min_imitated_share} is not from 0 to 1")
         if not self.end_margin >= 0.0:
             raise BadOption("end_margin", f"{self.end_margin} is not a number >= 0")
         if not 0 <= self.effort <= 100:
             raise BadOption("effort", f"{self.effort} is not from 0 to 100")
-        if not self.stray > 0.0:
-            raise BadOption("stray", f"{self.stray} is not a positive number")
+        if not self.max_deviation > 0.0:
+            raise BadOption("max_deviation", f"{self.max_deviation} is not a positive number")
         if not self.biases:
             raise BadOption("biases", "there must be at least one")
         for name in ("spacing", "max_seconds"):

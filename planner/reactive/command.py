@@ -61,12 +61,12 @@ class Command(NamedTuple):
         velocity: (dof,) joint speeds [rad/s or m/s].
         state: one of `STATES`.
         reason: why, where the state is "blocked" or "failed".
-        room: smallest distance of a close pair less what it must keep [m]; inf if nothing is close.
+        slack: smallest distance of a close pair less what it must keep [m]; inf if nothing is close.
         detail: what is in the way of what, where the state is "blocked" or "failed" and something is.
     """
 
     velocity: np.ndarray
     state: str
     reason: str
-    room: float
+    slack: float
     detail: str = ""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..collision.clearance import room_of_near
+from ..collision.clearance import near_pair_slack
 from ..collision.robot_arrays import HEADER, N_OBSTACLES, OBSTACLES
 from ..control.arm_arrays import pose_at
 from ..control.pursuit import ARRIVED, INDEX
@@ -32,28 +32,28 @@ BEFORE, BEHIND = 0.4, 0.8
 """Seconds about the moment of the first conflict in which an obstacle's places are planned round."""
 GAIN = 0.3
 """Seconds by which waiting or a detour must arrive sooner than going on."""
-HAIR = 1e-3
+CREEP_TOLERANCE = 1e-3
 """Room [m] by which a roll-out may come closer than it is or must keep, and still count as safe."""
 
 
-class Ahead(NamedTuple):
+class Prediction(NamedTuple):
     """What a roll-out has foreseen.
 
     Attributes:
         arrival: seconds until the end of the path, estimated behind the horizon.
-        room: smallest room on the way [m].
+        slack: smallest room on the way [m].
         safe: nothing comes closer than it must keep, or than it is.
         conflict: seconds until the safety layer first has to change a command; None if never.
     """
 
     arrival: float
-    room: float
+    slack: float
     safe: bool
     conflict: float | None
 
 
 @kernel
-def roll_ahead(work, g, path, q, dt, memory, wait, ticks, wish, out):
+def roll_ahead(work, g, path, q, dt, pursuit_state, wait, ticks, wish, out):
     """Follow a path from q among obstacles that move, after standing still for some ticks.
 
     Args:
@@ -62,7 +62,7 @@ def roll_ahead(work, g, path, q, dt, memory, wait, ticks, wish, out):
         path: same.
         q: (dof,) joints, moved along.
         dt: seconds per tick.
-        memory: (4,) of the pursuit.
+        pursuit_state: (4,) of the pursuit.
         wait: ticks to stand still first, giving way.
         ticks: to look ahead.
         wish: (dof,) scratch.
@@ -77,10 +77,10 @@ def roll_ahead(work, g, path, q, dt, memory, wait, ticks, wish, out):
             wish[:] = 0.0
             safety = safe_velocity(g, q, wish, dt, out)
         else:
-            status, safety = guarded_tick(work, g, path, q, dt, memory, wish, out)
+            status, safety = guarded_tick(work, g, path, q, dt, pursuit_state, wish, out)
             if status == ARRIVED:
                 return True, k, least, first
-        least = min(least, room_of_near(g, -1, 0.0))
+        least = min(least, near_pair_slack(g, -1, 0.0))
         if safety != FREE and first < 0:
             first = k
         for i in range(len(q)):
@@ -91,7 +91,7 @@ def roll_ahead(work, g, path, q, dt, memory, wait, ticks, wish, out):
     return False, ticks, least, first
 
 
-class Foresight:
+class Predictor:
     """Rolls out what an arm may do among obstacles that move.
 
     Args:
@@ -104,17 +104,19 @@ class Foresight:
     def __init__(self, work: np.ndarray, dt: float, horizon: float, pace: float):
         self._work, self._dt, self._horizon, self._pace = work, dt, horizon, pace
 
-    def ahead(self, robot: np.ndarray, path: PosePath, memory: np.ndarray, q: np.ndarray, wait: float = 0.0) -> Ahead:
+    def ahead(
+        self, robot: np.ndarray, path: PosePath, pursuit_state: np.ndarray, q: np.ndarray, wait: float = 0.0
+    ) -> Prediction:
         """What comes of following a path after a wait.
 
         Args:
-            robot: the arm among the obstacles as they are now, see `robot_work`; left as it is.
+            robot: the arm among the obstacles as they are now, see `robot_arrays`; left as it is.
             path: to follow.
-            memory: (4,) of its pursuit; left as it is.
+            pursuit_state: (4,) of its pursuit; left as it is.
             q: (dof,) joints now.
             wait: seconds to stand still first.
         """
-        g, end, after, before = robot.copy(), q.copy(), memory.copy(), room_of_near(robot, -1, 0.0)
+        g, end, after, before = robot.copy(), q.copy(), pursuit_state.copy(), near_pair_slack(robot, -1, 0.0)
         ticks, scratch = round(self._horizon / self._dt), np.empty((2, len(q)))
         arrived, used, least, first = roll_ahead(
             self._work, g, path.dqs, end, self._dt, after, round(wait / self._dt), ticks, scratch[0], scratch[1]
@@ -123,11 +125,11 @@ class Foresight:
         if not arrived:
             arrival += self._left(path, int(after[INDEX]), end) / self._pace
         conflict = None if first < 0 else first * self._dt
-        return Ahead(arrival, least, least >= min(before, 0.0) - HAIR, conflict)
+        return Prediction(arrival, least, least >= min(before, 0.0) - CREEP_TOLERANCE, conflict)
 
     def _left(self, path: PosePath, index: int, q: np.ndarray) -> float:
         """Screw length [m] from the tool at joints q to a pose of the path and on to its end."""
-        from_tool = self._tool(q).gap(path[index])
+        from_tool = self._tool(q).distance_to(path[index])
         lengths = path.lengths()
         return math.hypot(from_tool[0], METERS_PER_RADIAN * from_tool[1]) + float(lengths[-1] - lengths[index])
 
@@ -135,11 +137,11 @@ class Foresight:
         return Pose(np.array(pose_at(self._work, q)))
 
 
-def is_better(one: Ahead, other: Ahead) -> bool:
+def is_preferable(one: Prediction, other: Prediction) -> bool:
     """True if one is safe and the other is not; arrives sooner, if both are; has more room, if none is."""
     if one.safe != other.safe:
         return one.safe
-    return one.arrival + GAIN < other.arrival if one.safe else one.room > other.room + HAIR
+    return one.arrival + GAIN < other.arrival if one.safe else one.slack > other.slack + CREEP_TOLERANCE
 
 
 def windows(conflict: float, horizon: float) -> Iterator[tuple[float, float]]:
@@ -153,8 +155,8 @@ def swept(obstacles: Sequence[Obstacle], start: float, end: float) -> list[Obsta
     out = []
     for obstacle in obstacles:
         if moves(obstacle):
-            way = float(np.linalg.norm(obstacle.velocity)) * (end - start)
-            count = min(MOST_PLACES, max(1, math.ceil(way / SPACING)) + 1)
+            displacement = float(np.linalg.norm(obstacle.velocity)) * (end - start)
+            count = min(MOST_PLACES, max(1, math.ceil(displacement / SPACING)) + 1)
             out += [replace(obstacle.at(t), velocity=np.zeros(3)) for t in np.linspace(start, end, count)]
     return out
 
@@ -167,7 +169,7 @@ def same_scene(before: Sequence[Obstacle], now: Sequence[Obstacle]) -> bool:
         if old.name != new.name or old.shape != new.shape or old.margin != new.margin or moves(old) != moves(new):
             return False
         if not moves(new):
-            distance, angle = old.pose.gap(new.pose)
+            distance, angle = old.pose.distance_to(new.pose)
             if math.hypot(distance, METERS_PER_RADIAN * angle) > SAME_PLACE:
                 return False
     return True

@@ -12,15 +12,15 @@ from itertools import product
 
 import numpy as np
 
-from ..control.arm_arrays import bound
+from ..control.arm_arrays import arm_arrays
 from ..control.controller import Controller
 from ..geometry import dualquat as dq
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle, Sphere
 from ..imitation.segmentation import resampled
 from ..imitation.tsia import final_path, imitated_path, screw_path
-from ..planning.joint_space_motion import joint_leg
-from ..planning.planning_scene import SceneWork
+from ..planning.joint_space_motion import plan_joint_space
+from ..planning.planning_scene import PlanningScene
 from ..planning.settings import JointSearchSettings, PlanSettings
 from ..robot.arm import Arm
 from ..robot.body import FRAME, RADIUS, WIDTH, Body
@@ -54,7 +54,7 @@ def warm_up(arm: Arm, body: Body) -> None:
     SafetyLayer((arm,), (point,), (FAR,), SHORT.motion.dt)(q, np.zeros(arm.dof))
     Controller(arm)(q, path[-1])
     # what names what is in the way
-    scene = SceneWork.of(arm, body, (FAR,), SHORT)
+    scene = PlanningScene.of(arm, body, (FAR,), SHORT)
     scene.tightest(q)
     scene.tightest_of_tool(path[0])
 
@@ -85,10 +85,10 @@ def _algebra(x: np.ndarray) -> None:
 
 
 def _follow(planner: ReactivePlanner, q: np.ndarray, path: PosePath, seen: tuple[Obstacle, ...]) -> None:
-    """A leg planned, followed, and foreseen where something moves; then strictly along it."""
-    for strictly in (False, True):
+    """Plan a motion, follow it, and predict it where something moves; then once without detours."""
+    for detours in (True, False):
         planner.see(seen)
-        planner.go(path, strictly=strictly)
+        planner.go(path, detours=detours)
         planner.step(q)
         planner.see(tuple(obstacle.at(STEP) for obstacle in seen))
         planner.step(q)
@@ -98,7 +98,7 @@ def _search(arm: Arm, point: Body, q: np.ndarray) -> None:
     """A search in joint space, to where the arm is: whatever it can reach, it can reach that."""
     here, motion = arm.fk(q), SHORT.motion
     scene, work = (
-        SceneWork.of(arm, point, (FAR,), SHORT),
-        bound(arm, motion.controller.packed(), motion.pursuit.packed()),
+        PlanningScene.of(arm, point, (FAR,), SHORT),
+        arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed()),
     )
-    joint_leg(arm, scene, work, PosePath(here.dq[None]), here, q, SHORT, None, 0)
+    plan_joint_space(arm, scene, work, PosePath(here.dq[None]), here, q, SHORT, None, 0)

@@ -20,7 +20,7 @@ from .arm import Arm
 from .body import FRAME, RADIUS, A, B, Body
 from .chain_readers import mujoco_bodies, mujoco_id, mujoco_pose, pinocchio_axis, turn_z_to
 from .kinematics import PRISMATIC, REVOLUTE
-from .link_capsules import Geometry, Joint, Part, Robot, Split, body_of, joined, joint_frames, moved, placed
+from .link_capsules import Geometry, Joint, Link, RobotModel, Split, body_of, joined, joint_frames, moved, placed
 
 NOTHING = Geometry([], np.zeros((0, 3)))
 
@@ -61,9 +61,9 @@ def body_from_mujoco(model: Any, arm: Arm, joint_names: Sequence[str], *, split:
             others = tuple(_mujoco_joint(model, joint) for joint in joints[body])
         pose = mujoco_pose(model.body_pos[body], model.body_quat[body])
         geometry = joined([NOTHING, *(_mujoco_geometry(model, geom) for geom in _solid(model, body))])
-        parts.append(Part(model.body(body).name, int(model.body_parentid[body]) - 1, pose, own, others, geometry))
+        parts.append(Link(model.body(body).name, int(model.body_parentid[body]) - 1, pose, own, others, geometry))
     chain = [(int(model.jnt_bodyid[joint]) - 1, model.jnt_axis[joint], model.jnt_pos[joint]) for joint in wanted]
-    return body_of(Robot(source, parts, model.qpos0[model.jnt_qposadr[wanted]], chain), arm, split)
+    return body_of(RobotModel(source, parts, model.qpos0[model.jnt_qposadr[wanted]], chain), arm, split)
 
 
 def body_from_urdf(
@@ -108,13 +108,13 @@ def body_from_urdf(
     world_from_root = joint_frames(arm, np.zeros(arm.dof))[0] @ first.inverse()
     parts = _pinocchio_parts(model, geometry, chain, world_from_root, source)
     joints = [(joint, *pinocchio_axis(model, joint, source)[:2]) for joint in chain]
-    return body_of(Robot(str(source), parts, np.zeros(arm.dof), joints), arm, split)
+    return body_of(RobotModel(str(source), parts, np.zeros(arm.dof), joints), arm, split)
 
 
-def resting_pairs(arm: Arm, body: Body, keep: float = 0.0) -> list[tuple[int, int]]:
+def resting_pairs(arm: Arm, body: Body, distance: float = 0.0) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of an arm's own capsules that no check may look at.
 
-    They are in the same or in neighboring frames, where they always touch, or they are closer than `keep` [m] with
+    They are in the same or in neighboring frames, where they always touch, or they are closer than `distance` [m] with
     every joint in the middle of its range (at zero if it has none), where real links are not: only the capsules are.
     """
     free = ~(np.isfinite(arm.lower) & np.isfinite(arm.upper))
@@ -125,7 +125,7 @@ def resting_pairs(arm: Arm, body: Body, keep: float = 0.0) -> list[tuple[int, in
     for i in range(len(body)):
         for j in range(i + 1, len(body)):
             gap = segment_distance(*ends[i], *ends[j]) - body.rows[i, RADIUS] - body.rows[j, RADIUS]
-            if abs(body.rows[i, FRAME] - body.rows[j, FRAME]) <= 1 or gap <= keep:
+            if abs(body.rows[i, FRAME] - body.rows[j, FRAME]) <= 1 or gap <= distance:
                 pairs.append((i, j))
     return pairs
 
@@ -189,7 +189,7 @@ def _geometry_of(shape: Shape) -> Geometry:
     return Geometry([], corner_points(shape))
 
 
-def _pinocchio_parts(model: Any, geometry: Any, chain: list[int], world_from_root: Pose, source: Path) -> list[Part]:
+def _pinocchio_parts(model: Any, geometry: Any, chain: list[int], world_from_root: Pose, source: Path) -> list[Link]:
     """A part per joint, number 0 being the root, with the link that the joint moves; then one per link welded on."""
     joined_links: dict[tuple[int, int], list[Geometry]] = {}
     for item in geometry.geometryObjects:
@@ -202,14 +202,14 @@ def _pinocchio_parts(model: Any, geometry: Any, chain: list[int], world_from_roo
         own = links.pop(min((key for key in links if key[0] == joint), default=(-1, -1)), NOTHING)
         if joint == 0:
             own = joined([own, *(links.pop(key) for key in [key for key in links if key[0] == 0])])
-            parts.append(Part("root", -1, world_from_root, -1, (), own))
+            parts.append(Link("root", -1, world_from_root, -1, (), own))
             continue
         pose = Pose.from_matrix(model.jointPlacements[joint].homogeneous)
         frame = chain.index(joint) if joint in chain else None
         others = () if joint in chain else (_pinocchio_joint(model, joint, source),)
-        parts.append(Part(model.names[joint], int(model.parents[joint]), pose, frame, others, own))
+        parts.append(Link(model.names[joint], int(model.parents[joint]), pose, frame, others, own))
     welded = [
-        Part(model.frames[link].name, joint, Pose.identity(), None, (), own) for (joint, link), own in links.items()
+        Link(model.frames[link].name, joint, Pose.identity(), None, (), own) for (joint, link), own in links.items()
     ]
     return parts + welded
 

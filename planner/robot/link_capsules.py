@@ -64,7 +64,7 @@ class Geometry(NamedTuple):
     points: np.ndarray
 
 
-class Part(NamedTuple):
+class Link(NamedTuple):
     """Geometry that moves as one.
 
     Attributes:
@@ -84,7 +84,7 @@ class Part(NamedTuple):
     geometry: Geometry
 
 
-class Robot(NamedTuple):
+class RobotModel(NamedTuple):
     """What a reader found.
 
     Attributes:
@@ -95,7 +95,7 @@ class Robot(NamedTuple):
     """
 
     source: str
-    parts: list[Part]
+    parts: list[Link]
     reference: np.ndarray
     joints: list[tuple[int, np.ndarray, np.ndarray]]
 
@@ -138,7 +138,7 @@ def joined(geometries: list[Geometry]) -> Geometry:
     return Geometry(exact, np.vstack([np.zeros((0, 3)), *(geometry.points for geometry in geometries)]))
 
 
-def body_of(robot: Robot, arm: Arm, split: Split) -> Body:
+def body_of(robot: RobotModel, arm: Arm, split: Split) -> Body:
     """Capsules that contain a robot's parts, named and placed as `body_models` says.
 
     Raises:
@@ -165,14 +165,14 @@ def body_of(robot: Robot, arm: Arm, split: Split) -> Body:
     return Body(np.array(rows), tuple(labels))
 
 
-def _world_from_parts(parts: list[Part]) -> list[Pose]:
+def _world_from_parts(parts: list[Link]) -> list[Pose]:
     world: list[Pose] = []
     for part in parts:
         world.append(part.pose if part.parent < 0 else world[part.parent] @ part.pose)
     return world
 
 
-def _pieces(robot: Robot, world: list[Pose], frames: list[Pose]) -> list[_Piece]:
+def _pieces(robot: RobotModel, world: list[Pose], frames: list[Pose]) -> list[_Piece]:
     """Every link by itself, all that is welded to the last one, and all that moves on it; base first."""
     parts, last = robot.parts, len(frames) - 2
     owner: list[int | None] = []
@@ -210,7 +210,7 @@ def placed(a_from_b: Pose, geometry: Geometry) -> Geometry:
     return Geometry(exact, moved(a_from_b, geometry.points))
 
 
-def _swept(robot: Robot, k: int) -> np.ndarray:
+def _swept(robot: RobotModel, k: int) -> np.ndarray:
     """Points whose hull contains a part and all that hangs on it, in its frame, wherever the other joints are."""
     part = robot.parts[k]
     clouds = [part.geometry.points]
@@ -223,7 +223,7 @@ def _swept(robot: Robot, k: int) -> np.ndarray:
     return _fewer(np.vstack(clouds))
 
 
-def _through(robot: Robot, part: Part, points: np.ndarray) -> np.ndarray:
+def _through(robot: RobotModel, part: Link, points: np.ndarray) -> np.ndarray:
     """Points of a part, swept by its joints, in the parent's frame."""
     for joint in reversed(part.joints):
         points = _fewer(sweep(joint, points, robot.source, part.name))

@@ -1,7 +1,7 @@
 """Bounds on joint speeds that keep what is close from coming too close, and the nearest speeds that keep them.
 
 For every close pair the approach is at most proportional to the room that is left,
-`n . (J qdot - v) >= -alpha * room`; all pairs at once, by the nearest joint speeds in the sense of the tools' motion.
+`n . (J qdot - v) >= -alpha * slack`; all pairs at once, by the nearest joint speeds in the sense of the tools' motion.
 Method reference section 7, velocity form. The paper projects a pose error instead, and its formula adds a vector to
 a unit dual quaternion (section 12, item 5).
 """

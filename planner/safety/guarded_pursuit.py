@@ -25,25 +25,25 @@ def safe_tick(work, g, q, target, sign, dt, out):
 
 
 @kernel
-def guarded_tick(work, g, path, q, dt, memory, wish, out):
+def guarded_tick(work, g, path, q, dt, pursuit_state, wish, out):
     """One tick along a path: the wanted speeds into `wish`, the safe ones into `out`; both statuses.
 
     Args:
         work: arm and controller, see `workspace`.
-        g: the arm among obstacles, see `robot_work`.
+        g: the arm among obstacles, see `robot_arrays`.
         path: (n, 8).
         q: (dof,) joints.
         dt: seconds.
-        memory: (4,) of the pursuit.
+        pursuit_state: (4,) of the pursuit.
         wish: (dof,) result.
         out: (dof,) result.
     """
-    status = pursue(work, path, q, dt, memory, wish)
+    status = pursue(work, path, q, dt, pursuit_state, wish)
     return status, safe_velocity(g, q, wish, dt, out)
 
 
 @kernel
-def guarded_roll_out(work, g, path, q, dt, memory, wish, out, trace, first):
+def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, first):
     """Follow a path from q among obstacles that stand still; every step of the trace is proven clear.
 
     Args:
@@ -52,7 +52,7 @@ def guarded_roll_out(work, g, path, q, dt, memory, wish, out, trace, first):
         path: same.
         q: (dof,) joints, moved along.
         dt: seconds.
-        memory: (4,) of the pursuit.
+        pursuit_state: (4,) of the pursuit.
         wish: (dof,) scratch.
         out: (dof,) scratch.
         trace: (t, dof) joints at every tick, written from row `first` on.
@@ -66,7 +66,7 @@ def guarded_roll_out(work, g, path, q, dt, memory, wish, out, trace, first):
         for i in range(len(q)):
             trace[count, i] = q[i]
             margin = min(margin, q[i] - work[LIMITS, i], work[LIMITS + 1, i] - q[i])
-        status, safety = guarded_tick(work, g, path, q, dt, memory, wish, out)
+        status, safety = guarded_tick(work, g, path, q, dt, pursuit_state, wish, out)
         if status != FOLLOWING:
             return status, count, margin, changed
         if safety != FREE:

@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 
 from ..collision.clearance import (
     find_near,
-    least_room,
+    min_slack,
+    near_pair_slack,
     placed_step_stays_clear,
     reach_of,
-    room_of_near,
     step_stays_clear,
 )
 from ..collision.robot_arrays import (
@@ -39,7 +39,7 @@ from ..collision.robot_arrays import (
     WISH,
     WORLD,
     place_capsules,
-    robot_work,
+    robot_arrays,
 )
 from ..errors import BadOption, BadShape, UnknownName
 from ..geometry.shapes import Obstacle, pack
@@ -114,7 +114,7 @@ class SafetySettings:
 
 
 @inner
-def _shortened(g, q, x, dt):
+def _backtracked(g, q, x, dt):
     """Shorten the speeds x (n,) until a step of dt seconds from q (n,) surely stays clear; the status.
 
     Where none does, the one of all that leaves most room is taken. Near pairs as found at q, capsules at WORLD.
@@ -127,7 +127,7 @@ def _shortened(g, q, x, dt):
         find_near(g, reach)
     if int(g[HEADER, N_NEAR]) == 0:
         return FREE
-    room, scale, best, best_room = room_of_near(g, -1, 0.0), 1.0, 0.0, -math.inf
+    slack, scale, best, best_room = near_pair_slack(g, -1, 0.0), 1.0, 0.0, -math.inf
     for k in range(halvings + 1):
         if k == halvings:
             scale = 0.0
@@ -135,10 +135,10 @@ def _shortened(g, q, x, dt):
             step[i] = scale * x[i] * dt
             g[WISH, i] = q[i] + step[i]
         place_capsules(g, g[WISH, :n], NEXT)
-        after = room_of_near(g, NEXT, dt)
+        after = near_pair_slack(g, NEXT, dt)
         if after > best_room:
             best, best_room = scale, after
-        gentle = room <= 0.0 or after >= (1.0 - g[SETTINGS, DECAY]) * room
+        gentle = slack <= 0.0 or after >= (1.0 - g[SETTINGS, DECAY]) * slack
         # the whole step is placed already, its ways are bound: mostly there is no need to look at parts of it
         whole = k == 0 and placed_step_stays_clear(g, step[:n], 0.0, dt)
         if gentle and (whole or step_stays_clear(g, q, step[:n], dt)):
@@ -156,11 +156,11 @@ def _all_far(g, q, x, dt):
     """True if at the last look everything was so far that nothing can be close now, nor during this step."""
     if g[SEEN, SEEN_COUNTS] == 0.0 or g[SEEN, SEEN_MOVING] == 1.0:
         return False
-    way = 0.0
+    displacement = 0.0
     for i in range(len(q)):
-        way += g[LEVERS, i] * (abs(q[i] - g[SEEN, i]) + abs(x[i]) * dt)
+        displacement += g[LEVERS, i] * (abs(q[i] - g[SEEN, i]) + abs(x[i]) * dt)
     # two parts of the robot may both move
-    return g[SEEN, SEEN_ROOM] - 2.0 * way > g[SETTINGS, SHELL]
+    return g[SEEN, SEEN_ROOM] - 2.0 * displacement > g[SETTINGS, SHELL]
 
 
 @inner
@@ -170,7 +170,7 @@ def _look(g, q):
     find_near(g, g[SETTINGS, SHELL])
     g[SEEN, SEEN_COUNTS] = 0.0
     if int(g[HEADER, N_NEAR]) == 0:
-        g[SEEN, SEEN_ROOM], g[SEEN, SEEN_COUNTS] = least_room(g, WORLD, 0.0, 1.0), 1.0
+        g[SEEN, SEEN_ROOM], g[SEEN, SEEN_COUNTS] = min_slack(g, WORLD, 0.0, 1.0), 1.0
         for i in range(len(q)):
             g[SEEN, i] = q[i]
 
@@ -180,7 +180,7 @@ def safe_velocity(g, q, qdot, dt, out):
     """Joint speeds near the wanted ones that keep clear; the status (FREE, CHANGED, HELD or BLOCKED).
 
     Args:
-        g: see `robot_work`.
+        g: see `robot_arrays`.
         q: (n,) joints of all arms.
         qdot: (n,) wanted speeds, any numbers whatever.
         dt: seconds that they will be held.
@@ -206,7 +206,7 @@ def safe_velocity(g, q, qdot, dt, out):
     if not (far and _all_far(g, q, out, dt)):
         if far:
             _look(g, q)
-        status = max(status, _shortened(g, q, out, dt))
+        status = max(status, _backtracked(g, q, out, dt))
     for i in range(n):
         g[PREVIOUS, i] = out[i]
     return BLOCKED if missed else status
@@ -218,12 +218,12 @@ class Filtered(NamedTuple):
     Attributes:
         velocity: (n,) joint speeds [rad/s or m/s].
         status: FREE, CHANGED, HELD or BLOCKED.
-        room: smallest distance of a close pair less what it must keep, before the step [m]; inf if none is close.
+        slack: smallest distance of a close pair less what it must keep, before the step [m]; inf if none is close.
     """
 
     velocity: np.ndarray
     status: int
-    room: float
+    slack: float
 
     @property
     def blocked(self) -> bool:
@@ -260,7 +260,7 @@ class SafetyLayer:
         if not 0 < self.dt < math.inf:
             raise BadOption("dt", f"{dt} is not a positive number of seconds")
         seen = [obstacle.at(self.settings.lead) for obstacle in obstacles]
-        self.work = robot_work(
+        self.work = robot_arrays(
             arms,
             bodies,
             pack(seen),
@@ -282,7 +282,7 @@ class SafetyLayer:
             raise BadOption("q", f"joint {int(np.argmin(np.isfinite(joints)))} is not finite")
         out = np.empty(self.joints)
         status = safe_velocity(self.work, joints, wanted, self.dt, out)
-        return Filtered(out, int(status), float(room_of_near(self.work, -1, 0.0)))
+        return Filtered(out, int(status), float(near_pair_slack(self.work, -1, 0.0)))
 
     def _checked(self, name: str, value: ArrayLike) -> np.ndarray:
         array = np.ascontiguousarray(value, dtype=np.float64)

@@ -11,7 +11,7 @@ from helpers.policies import LEARNED, PROGRAMS, installed
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.key_poses import DENSE
-from onedemo.baselines.motion.tool_frame import ToolMover
+from onedemo.baselines.motion.tool_frame import ToolFrameMotion
 from onedemo.bench.geometric.metrics import curve_gap
 from onedemo.bench.run.episode_jobs import policy_for
 from onedemo.bench.task_table import TASKS
@@ -80,8 +80,8 @@ def test_levels_s_and_t_are_what_they_are_called(task_env, name):
     nominal, sparse, turned = (
         policy_for(env, RunConfig.model_validate({**values, "level": level})) for level in ("L1", "S", "T")
     )
-    assert turned.mover.__class__ is ToolMover
-    assert sparse.mover.__class__ is nominal.mover.__class__ is not ToolMover
+    assert turned.motion_method.__class__ is ToolFrameMotion
+    assert sparse.motion_method.__class__ is nominal.motion_method.__class__ is not ToolFrameMotion
     for segment in sparse.demonstration.segments:
         kept = nominal.demonstration.segment_path(segment.name)
         path = resampled(key_poses(resampled(kept, DENSE), 6), DENSE)

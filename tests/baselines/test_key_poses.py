@@ -33,7 +33,7 @@ def test_a_sparse_demonstration_begins_ends_and_grips_where_the_whole_one_does(n
     for one, other in zip(whole.segments, few.segments, strict=True):
         for key in ("start", "stop"):
             a, b = getattr(one, key), getattr(other, key)
-            assert whole.path[a].gap(few.path[b])[0] < 1e-9 and whole.time[a] == few.time[b]
+            assert whole.path[a].distance_to(few.path[b])[0] < 1e-9 and whole.time[a] == few.time[b]
             np.testing.assert_allclose(few.joint_positions[b], whole.joint_positions[a], atol=1e-12)
             assert few.gripper[b] == whole.gripper[a]
         after = min(one.stop + 1, len(whole.path) - 1), min(other.stop + 1, len(few.path) - 1)
@@ -60,7 +60,7 @@ def test_the_way_between_key_poses_is_read_densely_and_meets_them(name, join):
     for segment in keys.segments:
         points, path = keys.segment_path(segment.name), few.segment_path(segment.name)
         assert np.diff(path.lengths()).max() < DENSE + 1e-6
-        assert max(min(pose.gap(other)[0] for other in path) for pose in points) < 1e-9
+        assert max(min(pose.distance_to(other)[0] for other in path) for pose in points) < 1e-9
 
 
 def test_screws_and_lines_read_a_turn_differently():

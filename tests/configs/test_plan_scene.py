@@ -182,7 +182,7 @@ obstacles:
     assert [type(o.shape) for o in scene.obstacles] == [Sphere, Capsule, Box, Cylinder, Mesh]
     ball, capsule, table = scene.obstacles[:3]
     assert (ball.name, ball.margin, list(ball.velocity)) == ("ball", 0.02, [0.0, 0.0, 0.5])
-    assert capsule.pose.gap(Pose.from_yaw([0, 0, 1], math.pi / 2)) == pytest.approx((0, 0), abs=1e-9)
+    assert capsule.pose.distance_to(Pose.from_yaw([0, 0, 1], math.pi / 2)) == pytest.approx((0, 0), abs=1e-9)
     assert (table.shape.size, table.pose.yaw) == ((0.1, 0.2, 0.3), pytest.approx(math.pi))
     assert scene.held is not None
     assert (scene.held.name, scene.held.shape) == ("cup", Cylinder(0.03, 0.1))
@@ -207,8 +207,8 @@ def test_demonstrations_come_in_small_steps_and_keep_their_ends(tmp_path):
     (tmp_path / "r.yaml").write_text(GOAL + "demonstration: {file: stack, segment: transfer}\n")
     shown = load_demonstration(shipped_demonstration("stack")).segment_path("transfer")
     recorded = load_scene(tmp_path / "r.yaml").demonstrated
-    assert recorded[0].gap(shown[0]) == pytest.approx((0, 0), abs=1e-9)
-    assert recorded[-1].gap(shown[-1]) == pytest.approx((0, 0), abs=1e-9)
+    assert recorded[0].distance_to(shown[0]) == pytest.approx((0, 0), abs=1e-9)
+    assert recorded[-1].distance_to(shown[-1]) == pytest.approx((0, 0), abs=1e-9)
 
 
 def test_files_are_looked_for_beside_the_scene_first(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from onedemo.baselines.learning.actor import Actor, Training, actor_for
+from onedemo.baselines.learning.actor import Actor, TrainingInfo, actor_for
 from onedemo.baselines.learning.actor_card import METHOD
 from onedemo.baselines.learning.actor_files import save_actor
 from onedemo.baselines.learning.feature_scaling import Normalization
@@ -35,7 +35,7 @@ def random_actor(env, method: str = "sac", *, hidden: tuple[int, ...] = (16, 16)
         scale = default_scale(task)
     network = random_network((features.size, *hidden, env.action_space.shape[0]), seed)
     normalization = Normalization.none(features.size)
-    training = Training("SAC", steps=1000, seed=seed, success=0.5, episodes=10, settings={"gamma": 0.98})
+    training = TrainingInfo("SAC", steps=1000, seed=seed, success=0.5, episodes=10, settings={"gamma": 0.98})
     return actor_for(task, network, features, normalization, method=method, residual_scale=scale, training=training)
 
 

@@ -10,7 +10,7 @@ from onedemo.bench.cli import main
 from onedemo.bench.console import console
 from onedemo.bench.episodes.run_folder import WHOLE, describe, open_folder
 from onedemo.bench.run.comparison import Comparison
-from onedemo.bench.run.run_progress import Board
+from onedemo.bench.run.run_progress import RunProgress
 from onedemo.bench.workers import processes
 from onedemo.bench.workers.dispatcher import Dispatcher
 from onedemo.bench.workers.processes import Processes
@@ -44,7 +44,7 @@ def completed(grid, folder, executor, shard=WHOLE, **options):
         open_folder(folder, held, shard.name)
         describe(grid, folder, "a test")
         held.enter_context(executor)
-        return Comparison(grid, folder, Board(grid, console(stderr=True)), shard, **options).complete(executor)
+        return Comparison(grid, folder, RunProgress(grid, console(stderr=True)), shard, **options).complete(executor)
 
 
 if __name__ == "__main__":

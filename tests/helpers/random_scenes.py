@@ -34,7 +34,7 @@ from onedemo.planner.log.motion_log import MotionLog
 from onedemo.planner.planning.joint_space_rrt import connect
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planner import Planner
-from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.settings import PlanSettings
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import FRAME, A, Body
@@ -171,12 +171,12 @@ def problem(kind: str, seed: int) -> Problem:
         if kind == "held":
             body = empty.holding("box", Box(tuple(rng.uniform(0.04, 0.12, 3))), at([0, 0, 0.03]), arm)
         obstacles = tuple(_obstacles(kind, rng, here, goal.position))
-        scene = SceneWork.of(arm, body, obstacles, SETTINGS)
-        if scene.room(start) < START_ROOM or base_gap(body, obstacles) < SETTINGS.safety.distance:
+        scene = PlanningScene.of(arm, body, obstacles, SETTINGS)
+        if scene.slack(start) < START_ROOM or base_gap(body, obstacles) < SETTINGS.safety.distance:
             continue
         if kind == "cage":
             return Problem(kind, seed, body, start, goal, obstacles, None)
-        if scene.tool_room(goal) < GOAL_ROOM:
+        if scene.tool_slack(goal) < GOAL_ROOM:
             continue
         posture = clear_posture(arm, scene, goal, start, rng)
         if posture is not None:
@@ -184,7 +184,7 @@ def problem(kind: str, seed: int) -> Problem:
 
 
 def base_gap(body: Body, obstacles) -> float:
-    """Distance [m] of the parts that no joint moves; `SceneWork.room` leaves them out."""
+    """Distance [m] of the parts that no joint moves; `PlanningScene.slack` leaves them out."""
     return tool_gap(body.rows[body.rows[:, FRAME] < 0][:, A:], obstacles, Pose.identity())
 
 
@@ -193,7 +193,7 @@ def clear_posture(arm, scene, goal, start, rng, tries: int = 12) -> np.ndarray |
     for k in range(tries):
         guess = start if k == 0 else rng.uniform(arm.lower, arm.upper)
         q = inverse_kinematics(arm, goal, guess)
-        if q is not None and scene.room(q) > POSTURE_ROOM:
+        if q is not None and scene.slack(q) > POSTURE_ROOM:
             return q
     return None
 
@@ -244,7 +244,7 @@ def feasible(problem: Problem, postures: int = 20, iterations: int = 40_000) -> 
     if problem.posture is None:
         return False
     arm, rng = panda()[0], np.random.default_rng(problem.seed)
-    scene = SceneWork.of(arm, problem.body, problem.obstacles, SETTINGS)
+    scene = PlanningScene.of(arm, problem.body, problem.obstacles, SETTINGS)
     nodes, state = 20_000, np.ones(1)
     trees, parents = np.empty((2, nodes, arm.dof)), np.empty((2, nodes))
     out = np.empty((2 * nodes, arm.dof))

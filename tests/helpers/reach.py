@@ -21,8 +21,8 @@ from onedemo.envs.shelve import layout as shelf_layouts
 from onedemo.envs.shelve.layout import ShelfLayout, shelf_layout
 from onedemo.envs.shelve.parts import BOOK_SIZE, cupboard, stand, waiting
 from onedemo.envs.shelve.places import ShelfPlaces
-from onedemo.planner.collision.clearance import room_at
-from onedemo.planner.collision.robot_arrays import robot_work
+from onedemo.planner.collision.clearance import slack_at
+from onedemo.planner.collision.robot_arrays import robot_arrays
 from onedemo.planner.collision.self_collision import pairs_of
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.geometry import dualquat as dq
@@ -70,18 +70,18 @@ class Reach:
     def among(
         self, obstacles: Iterable[Obstacle], allowed: Sequence[tuple[str, str]] = (), body: Body | None = None
     ) -> np.ndarray:
-        """The robot, or a body of it that holds something, among these and its fixtures, for `room`.
+        """The robot, or a body of it that holds something, among these and its fixtures, for `slack`.
 
         The contacts of `allowed` do not count.
         """
         solids, body = (*self._parts.fixtures, *obstacles), body or self.body
         masks = contact_masks(body.names, solids, (*self._parts.touching, *allowed))
         settings = SafetySettings().packed(0.02)
-        return robot_work((self.arm,), (body,), pack(solids), masks=masks, pairs=self._pairs, settings=settings)
+        return robot_arrays((self.arm,), (body,), pack(solids), masks=masks, pairs=self._pairs, settings=settings)
 
     def room(self, work: np.ndarray, q: np.ndarray) -> float:
         """Smallest room [m] of the arm, also to itself."""
-        return float(room_at(work, q, 0.0, 1.0))
+        return float(slack_at(work, q, 0.0, 1.0))
 
     def solved(self, pose: Pose, q: np.ndarray) -> np.ndarray | None:
         """Joints near q (dof,) at a pose, within the limits."""
@@ -92,7 +92,7 @@ class Reach:
         """Joints at the end of a path that is followed from q; None where it cannot be, or something touches."""
         for row in path.dqs:
             found = None if q is None else self.solved(Pose(row), q)
-            if found is None or np.abs(found - q).max() > JUMP or self.room(work, found) < TOUCH:
+            if found is None or np.abs(found - q).max() > JUMP or self.slack(work, found) < TOUCH:
                 return None
             q = found
         return q
@@ -112,7 +112,7 @@ class Reach:
 
 def line(start: Pose, end: Pose) -> PosePath:
     """The screw from start to end, without the start."""
-    distance, angle = start.gap(end)
+    distance, angle = start.distance_to(end)
     count = max(1, int(np.ceil((distance + 0.15 * angle) / STEP)))
     return PosePath(dq.sclerp(start.dq, end.dq, np.linspace(0.0, 1.0, count + 1)[1:]))
 

@@ -343,16 +343,16 @@ BUGS = [
         "return min(status, HELD)",
         MOVING,
     ),
-    Bug("room ahead is not used up", "escape/detour", "        left -= way\n", "        left -= 0.0 * way\n", ROOM),
+    Bug("slack ahead is not used up", "escape/detour", "        left -= way\n", "        left -= 0.0 * way\n", ROOM),
     Bug(
-        "room ahead is used once too often", "escape/detour", "if left <= way and not", "if left <= -way and not", ROOM
+        "slack ahead is used once too often", "escape/detour", "if left <= way and not", "if left <= -way and not", ROOM
     ),
-    Bug("slide goes on too far", "collision/edge_certificates", "s -= room / slope", "s -= 3.0 * room / slope", EDGE),
+    Bug("slide goes on too far", "collision/edge_certificates", "s -= slack / slope", "s -= 3.0 * slack / slope", EDGE),
     Bug(
         "screw goes on too far",
         "collision/edge_certificates",
-        "stretch = room / speed",
-        "stretch = 3.0 * room / speed",
+        "stretch = slack / speed",
+        "stretch = 3.0 * slack / speed",
         EDGE,
     ),
     Bug(

@@ -43,7 +43,7 @@ def replayed(env, transitions, seed=0):
 @pytest.mark.parametrize("task", EPISODES)
 def test_it_succeeds_in_every_task_of_one_object(task, mode):
     env = gym.make(TASKS[task].id, control_mode=mode)
-    transitions = task_episode(env, shown(TASKS[task].shown))
+    transitions = task_episode(env, shown(TASKS[task].demonstrated_task))
     assert transitions.success and transitions.rewards[-1] == 1.0
     assert all(env.action_space.contains(action) for action in transitions.actions)
     assert replayed(env, transitions)["success"]
@@ -54,7 +54,7 @@ def test_it_succeeds_in_every_task_of_one_object(task, mode):
 @pytest.mark.parametrize("robot", ["Sawyer", "UR5e"])
 def test_another_arm_follows_it_too(robot):
     for task in ("reach", "place_one", "insert_one"):
-        assert task_episode(gym.make(TASKS[task].id, robot=robot), shown(TASKS[task].shown)).success, task
+        assert task_episode(gym.make(TASKS[task].id, robot=robot), shown(TASKS[task].demonstrated_task)).success, task
     assert task_episode(gym.make(TASKS["place_one"].id, robot=robot, onto="block"), shown("stack")).success
 
 
@@ -80,7 +80,7 @@ def test_the_hand_closes_round_a_block_and_goes_back():
     closing = int(np.argmax(grip > 0.0))
     assert (grip[:closing] == -1.0).all() and (grip[closing:] == 1.0).all()
     first = {key: value[0] for key, value in seen.observations.items()}
-    distance, angle = goal(first).gap(Pose.from_vector(tcp[closing - 1]))
+    distance, angle = goal(first).distance_to(Pose.from_vector(tcp[closing - 1]))
     assert distance < 0.003 and angle < 0.02
     axis = Pose.from_vector(tcp[-1]).rotation[:, 2]
     np.testing.assert_allclose(tcp[closing - 1, :3] - tcp[-1, :3], 0.1 * axis, atol=0.006)
@@ -108,13 +108,13 @@ poses = st.builds(
 def test_a_twist_leads_from_one_pose_toward_another(tcp, target, gain):
     action = twist_action(tcp, target, gain)
     assert np.abs(action).max() <= 1.0 + 1e-12
-    distance, angle = tcp.gap(target)
+    distance, angle = tcp.distance_to(target)
     dt = 1e-4
     turn = 0.5 * dt * MAX_ANGULAR * action[3:]
     step = Pose.from_position_quaternion([0, 0, 0], [np.sqrt(1.0 - turn @ turn), *turn])
     turned = Pose.from_position_quaternion([0, 0, 0], (step @ Pose(tcp.dq)).quaternion)
     after = Pose.from_position_quaternion(tcp.position + dt * MAX_LINEAR * action[:3], turned.quaternion)
-    nearer, less = after.gap(target)
+    nearer, less = after.distance_to(target)
     expected = gain * dt
     unbound = gain * np.concatenate([(target.position - tcp.position) / MAX_LINEAR, [angle / MAX_ANGULAR]])
     if np.abs(unbound).max() <= 1.0:

@@ -9,15 +9,15 @@ from helpers.random_scenes import at, demonstrated, judged, panda, problem
 
 from onedemo.baselines import extras
 from onedemo.baselines.factory import settings_of
-from onedemo.baselines.motion.generated_plan import NO_WAY
-from onedemo.baselines.motion.tool_obstacles import NearTool
-from onedemo.baselines.paths_only import PATH_MAKERS, leg_planner, made_path
+from onedemo.baselines.motion.generated_plan import NO_PATH
+from onedemo.baselines.motion.tool_obstacles import ToolObstacles
+from onedemo.baselines.paths_only import PATH_MAKERS, made_path, motion_planner
 from onedemo.planner.errors import BadConfig, MissingExtra, PlanFailed, UnknownName
 from onedemo.planner.escape.repet import clear_of, point_tool
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Obstacle, Sphere
 from onedemo.planner.imitation.tsia import final_path, guide_index, imitated_path
-from onedemo.planner.planning.planning_scene import Layout, SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene, SceneTemplate
 from onedemo.planner.safety.safety_layer import SafetySettings
 
 TOOL = point_tool(0.05)
@@ -40,7 +40,7 @@ def worst(one: PosePath, other: PosePath) -> float:
     """Largest distance [m], or a fifth of the angle, between poses of two paths; inf if they differ in number."""
     if len(one) != len(other):
         return np.inf
-    gaps = np.array([a.gap(b) for a, b in zip(one, other, strict=True)])
+    gaps = np.array([a.distance_to(b) for a, b in zip(one, other, strict=True)])
     return float(np.max(gaps * [1.0, 0.2]))
 
 
@@ -60,7 +60,7 @@ def test_what_makes_paths_is_every_policy_but_the_sampler():
 def test_paths_begin_at_the_start_and_end_at_the_goal(name):
     path = path_of(name)
     for pose, wanted in ((path[0], start_of()), (path[-1], PLACE)):
-        distance, angle = pose.gap(wanted)
+        distance, angle = pose.distance_to(wanted)
         assert distance < 1e-9 and angle < 1e-7
     steps = np.linalg.norm(np.diff(path.positions, axis=0), axis=1)
     assert steps.max() < 0.03
@@ -125,7 +125,7 @@ def test_replay_keeps_every_relative_motion_of_the_demonstration():
     shown, path = demonstrated(), path_of("replay")
     tail = path[len(path) - len(shown) :]
     for k in range(len(shown) - 1):
-        distance, angle = (tail[k].inverse() @ tail[k + 1]).gap(shown[k].inverse() @ shown[k + 1])
+        distance, angle = (tail[k].inverse() @ tail[k + 1]).distance_to(shown[k].inverse() @ shown[k + 1])
         assert distance < 1e-12 and angle < 1e-7
     way = path.positions[: len(path) - len(shown) + 1]
     straight = way[0] + np.linspace(0, 1, len(way))[:, None] * (way[-1] - way[0])
@@ -137,10 +137,10 @@ def test_from_the_demonstrated_start_to_the_demonstrated_goal_it_is_the_demonstr
     shown = demonstrated()
     path = path_of(name, shown[0], shown[-1])
     for pose in path:
-        gaps = np.array([pose.gap(other) for other in shown])
+        gaps = np.array([pose.distance_to(other) for other in shown])
         assert gaps[:, 0].min() < 0.006 and gaps[np.argmin(gaps[:, 0]), 1] < 0.05
     for pose in shown:
-        assert min(pose.gap(other)[0] for other in path) < 0.012
+        assert min(pose.distance_to(other)[0] for other in path) < 0.012
 
 
 def test_without_obstacles_nearby_the_potential_path_is_tsia_bit_by_bit():
@@ -157,7 +157,7 @@ def test_the_field_leads_round_a_ball_and_back_to_the_reference():
     free, led = path_of("screw-no-repet"), path_of("potential", obstacles=[ball])
     assert min(clear_of(pose, TOOL, [ball]) for pose in free) < 0.0
     assert min(clear_of(pose, TOOL, [ball]) for pose in led) > 0.0
-    assert led[-1].gap(PLACE)[0] < 1e-9
+    assert led[-1].distance_to(PLACE)[0] < 1e-9
     assert min(np.abs(led[-2].dq - pose.dq).max() for pose in free) < 1e-3
 
 
@@ -168,20 +168,20 @@ def test_in_a_pocket_the_field_has_a_minimum_and_says_so():
     corners = [np.array([-0.2, side, lift]) for side in (-0.1, 0.1) for lift in (-0.1, 0.1)]
     pocket = [Obstacle(Sphere(0.12), at(PLACE.position + corner)) for corner in corners]
     path = path_of("potential", start, goal, still, obstacles=pocket)
-    assert path[-1].gap(goal)[0] > 0.05
+    assert path[-1].distance_to(goal)[0] > 0.05
     assert min(clear_of(pose, TOOL, pocket) for pose in path) > -1e-3
 
 
 @pytest.mark.parametrize("name", installed("potential", "dmp-goal"))
 def test_what_appears_changes_only_what_is_still_to_come(name):
-    maker, shown = settings_of(name).maker, demonstrated()
-    nothing = NearTool(TOOL, ())
-    made = maker.make(shown, start_of(), PLACE, 20, nothing)
+    generator, shown = settings_of(name).generator, demonstrated()
+    nothing = ToolObstacles(TOOL, ())
+    made = generator.make(shown, start_of(), PLACE, 20, nothing)
     middle = len(made.path) // 3
-    again = maker.renewed(made, middle, nothing)
+    again = generator.renewed(made, middle, nothing)
     np.testing.assert_allclose(again.path.dqs, made.path.dqs, atol=1e-12)
     ahead = Obstacle(Sphere(0.03), at(made.path.positions[middle + 15] + [0.0, 0.03, 0.01]))
-    led = maker.renewed(made, middle, NearTool(TOOL, [ahead])).path
+    led = generator.renewed(made, middle, ToolObstacles(TOOL, [ahead])).path
     np.testing.assert_array_equal(led.dqs[: middle + 1], made.path.dqs[: middle + 1])
     after = min(len(led), len(made.path))
     assert np.abs(led.positions[:after] - made.path.positions[:after]).max() > 0.005
@@ -190,7 +190,7 @@ def test_what_appears_changes_only_what_is_still_to_come(name):
 
 def leg(name, obstacles=(), settings=None):
     arm, body, home = panda()
-    return leg_planner(name, arm, body, settings).plan(demonstrated(), home, PLACE, obstacles)
+    return motion_planner(name, arm, body, settings).plan(demonstrated(), home, PLACE, obstacles)
 
 
 @pytest.mark.parametrize("name", installed(*PROGRAMS))
@@ -199,7 +199,7 @@ def test_every_policy_plans_a_leg_that_its_arm_can_follow(name):
     arm, _, home = panda()
     assert plan.success, plan.why
     np.testing.assert_array_equal(plan.joints[0], home)
-    distance, angle = arm.fk(plan.joints[-1]).gap(PLACE)
+    distance, angle = arm.fk(plan.joints[-1]).distance_to(PLACE)
     assert distance < 2e-3 and angle < 0.02
     speeds = np.abs(np.diff(plan.joints, axis=0)) / plan.dt
     assert (speeds <= arm.velocity_limits * (1 + 1e-9)).all()
@@ -210,7 +210,7 @@ def test_every_policy_plans_a_leg_that_its_arm_can_follow(name):
 def test_the_samplers_joints_are_clear_for_an_independent_judge(name, kind, seed):
     scene = problem(kind, seed)
     arm, _, _ = panda()
-    planner = leg_planner(name, arm, scene.body)
+    planner = motion_planner(name, arm, scene.body)
     plan = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles)
     assert plan.success, plan.why
     certificate = judged(scene, plan)
@@ -223,15 +223,17 @@ def test_the_samplers_joints_are_clear_for_an_independent_judge(name, kind, seed
 def test_the_sampler_gives_up_after_its_budget(name):
     scene = problem("cage", 0)
     arm, _, _ = panda()
-    tight = leg_planner(name, arm, scene.body, {"sampling": {"budget": 200, "approach": 0.0}})
+    tight = motion_planner(name, arm, scene.body, {"sampling": {"budget": 200, "approach": 0.0}})
     plan = tight.plan(demonstrated(), scene.start, scene.goal, scene.obstacles)
     assert not plan.success and len(plan.joints) == 1
 
 
 def smallest_room(plan, ball) -> float:
     """Distance [m] of the whole arm from a ball on the way, less a millimeter for the ticks between."""
-    scene = SceneWork(Layout(plan.asked.arm, plan.asked.body, SafetySettings(distance=0.0), plan.dt), [ball], 0.0)
-    return min(scene.room(q) for q in plan.joints)
+    scene = PlanningScene(
+        SceneTemplate(plan.request.arm, plan.request.body, SafetySettings(distance=0.0), plan.dt), [ball], 0.0
+    )
+    return min(scene.slack(q) for q in plan.joints)
 
 
 @pytest.mark.parametrize("name", ["decoupled", "replay"])
@@ -242,7 +244,7 @@ def test_a_guard_is_off_unless_it_is_asked_for(name):
     blind = leg(name, [ball])
     assert blind.success and blind.changed == 0 and smallest_room(blind, ball) < 0.0
     if name == "replay":
-        assert blind.kept < 1.0
+        assert blind.imitated_share < 1.0
     guarded = leg(name, [ball], {"guard": True})
     if guarded.success:
         assert smallest_room(guarded, ball) > 0.0
@@ -268,7 +270,7 @@ def test_without_the_guard_the_method_still_leads_its_hand_round():
         if seen == 2:
             return
         scene = problem("convex", seed)
-        plan = leg_planner("screw-no-guard", arm, scene.body).plan(
+        plan = motion_planner("screw-no-guard", arm, scene.body).plan(
             demonstrated(), scene.start, scene.goal, scene.obstacles
         )
         if plan.success and plan.how == "escape":
@@ -282,7 +284,7 @@ def test_a_path_that_ends_before_the_goal_is_no_plan():
     ball = Obstacle(Sphere(0.06), PLACE, name="ball")
     plan = leg("potential", [ball])
     if not plan.success:
-        assert plan.reason in (NO_WAY, "ik_or_limit") and len(plan.joints) == 1
+        assert plan.reason in (NO_PATH, "ik_or_limit") and len(plan.joints) == 1
 
 
 def test_a_blocked_path_of_the_method_is_a_reason():
@@ -321,9 +323,9 @@ def test_the_tool_near_two_obstacles_is_asked_for_each():
         Obstacle(Sphere(0.02), at([0.1, 0.0, 0.0])),
         Obstacle(Sphere(0.02), at([0.0, 0.075, 0.0]), margin=0.001),
     )
-    near = NearTool(TOOL, [ball, board]).at(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.1)
-    assert [each.reach for each in sorted(near, key=lambda each: each.room)] == [0.01, 0.1]
-    first = max(near, key=lambda each: each.room)
-    assert first.room == pytest.approx(0.03, abs=1e-9)
+    near = ToolObstacles(TOOL, [ball, board]).at(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.1)
+    assert [each.reach for each in sorted(near, key=lambda each: each.slack)] == [0.01, 0.1]
+    first = max(near, key=lambda each: each.slack)
+    assert first.slack == pytest.approx(0.03, abs=1e-9)
     np.testing.assert_allclose(first.normal, [-1.0, 0.0, 0.0], atol=1e-9)
     assert Pose.from_position_quaternion(first.normal).position[0] == -1.0

@@ -8,7 +8,7 @@ from helpers.policies import PROGRAMS, installed
 from helpers.random_scenes import at, demonstrated, judged, panda, problem
 
 from onedemo.baselines.factory import make_policy, settings_of
-from onedemo.baselines.motion.tool_frame import ToolMover, seen_from
+from onedemo.baselines.motion.tool_frame import ToolFrameMotion, seen_from
 from onedemo.bench.geometric.metrics import curve_gap
 from onedemo.planner.errors import BadConfig
 from onedemo.planner.geometry.pose import Pose, PosePath
@@ -25,8 +25,8 @@ UNHURRIED = {"controller": {"max_linear": 50.0, "max_angular": 50.0}}
 def planned(name, tool=None, motion=None, goal=PLACE, **asked):
     arm, body, home = panda()
     settings = settings_of(name, {"motion": motion or {}})
-    mover = settings.mover if tool is None else ToolMover(settings.mover, tool)
-    return mover.planner(arm, body, settings.plan).plan(demonstrated(), home, goal, **asked)
+    motion_method = settings.motion_method if tool is None else ToolFrameMotion(settings.motion_method, tool)
+    return motion_method.planner(arm, body, settings.plan).plan(demonstrated(), home, goal, **asked)
 
 
 def way_of(plan) -> PosePath:
@@ -38,14 +38,14 @@ def way_of(plan) -> PosePath:
 def test_what_is_asked_and_answered_is_of_the_true_tcp(name):
     arm, body, home = panda()
     plan = planned(name, TOOL)
-    assert plan.success and plan.asked.arm is arm and plan.asked.body is body
+    assert plan.success and plan.request.arm is arm and plan.request.body is body
     np.testing.assert_array_equal(plan.joints[0], home)
     end = arm.fk(plan.joints[-1])
-    assert end.gap(PLACE)[0] < 3e-3 and end.gap(PLACE)[1] < 0.02
-    for pose in (plan.path[-1], plan.imitated[-1], plan.asked.goal):
-        assert pose.gap(PLACE)[0] < 1e-3 and pose.gap(PLACE)[1] < 1e-3
-    shown = plan.asked.demonstrated
-    assert max(np.array([a.gap(b) for a, b in zip(shown, demonstrated(), strict=True)]).ravel()) < 1e-7
+    assert end.distance_to(PLACE)[0] < 3e-3 and end.distance_to(PLACE)[1] < 0.02
+    for pose in (plan.path[-1], plan.imitated[-1], plan.request.goal):
+        assert pose.distance_to(PLACE)[0] < 1e-3 and pose.distance_to(PLACE)[1] < 1e-3
+    shown = plan.request.demonstrated
+    assert max(np.array([a.distance_to(b) for a, b in zip(shown, demonstrated(), strict=True)]).ravel()) < 1e-7
 
 
 def test_the_pull_along_a_screw_is_the_same_motion_and_what_is_no_screw_is_not():
@@ -75,7 +75,7 @@ def test_with_all_limits_the_screws_way_changes_by_a_hair_and_that_of_the_others
 def test_ways_round_obstacles_are_clear_for_an_independent_judge(kind, seed):
     scene, settings = problem(kind, seed), settings_of("screw")
     arm, _, _ = panda()
-    planner = ToolMover(settings.mover, TOOL).planner(arm, scene.body, settings.plan)
+    planner = ToolFrameMotion(settings.motion_method, TOOL).planner(arm, scene.body, settings.plan)
     plan = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles)
     assert plan.success, plan.why
     assert plan.tree is None
@@ -89,14 +89,14 @@ def test_a_plan_seen_from_elsewhere_and_back_is_the_plan():
     again = seen_from(seen_from(plan, arm.with_tool(TOOL), TOOL), arm, TOOL.inverse())
     np.testing.assert_allclose(again.path_poses, plan.path_poses, atol=1e-12)
     np.testing.assert_allclose(again.imitated_poses, plan.imitated_poses, atol=1e-12)
-    assert again.asked.goal.gap(plan.asked.goal)[0] < 1e-12
+    assert again.request.goal.distance_to(plan.request.goal)[0] < 1e-12
 
 
 def followed(name, go, tool=TOOL):
     """Joints (t, dof) of a leg that is followed."""
     arm, body, home = panda()
     settings = settings_of(name, {})
-    follower = ToolMover(settings.mover, tool).follower(arm, body, settings.reactive)
+    follower = ToolFrameMotion(settings.motion_method, tool).follower(arm, body, settings.reactive)
     follower.see(())
     go(follower)
     joints = [home]
@@ -113,7 +113,7 @@ def test_a_path_is_followed_to_its_end_by_the_true_tcp(name):
     arm, _, home = panda()
     path = screw_path(arm.fk(home), at([0.0, 0.15, 0.05]) @ arm.fk(home) @ TURN, 0.005)
     joints = followed(name, lambda follower: follower.go(path))
-    distance, angle = arm.fk(joints[-1]).gap(path[-1])
+    distance, angle = arm.fk(joints[-1]).distance_to(path[-1])
     assert distance < 3e-3 and angle < 0.02
 
 
@@ -121,7 +121,7 @@ def test_a_plan_of_a_maker_is_followed_as_it_was_planned():
     arm, _, _ = panda()
     plan = planned("replay", TOOL)
     joints = followed("replay", lambda follower: follower.follow(plan))
-    assert arm.fk(joints[-1]).gap(PLACE)[0] < 3e-3
+    assert arm.fk(joints[-1]).distance_to(PLACE)[0] < 3e-3
     way = PosePath(np.array([arm.fk(q).dq for q in joints]))
     assert curve_gap(way, way_of(plan)) < 1e-3
 
@@ -130,10 +130,10 @@ def test_the_way_of_two_hands_is_made_in_the_other_frame():
     about_y = at([0.0, 0.0, 0.0], [np.cos(0.4), 0.0, np.sin(0.4), 0.0])
     shown, start = demonstrated(), at([-0.2, 0.1, 0.1]) @ demonstrated()[0] @ TURN @ TURN @ about_y
     for name, same in (("screw", True), ("decoupled", False)):
-        mover = settings_of(name).mover
-        one, other = mover.relative(shown, start), ToolMover(mover, TOOL).relative(shown, start)
+        motion_method = settings_of(name).motion_method
+        one, other = motion_method.relative(shown, start), ToolFrameMotion(motion_method, TOOL).relative(shown, start)
         for pose, wanted in ((other.path[0], start), (other.path[-1], shown[-1])):
-            assert pose.gap(wanted)[0] < 1e-12
+            assert pose.distance_to(wanted)[0] < 1e-12
         assert (curve_gap(other.path, one.path) < 1e-9) == same
 
 

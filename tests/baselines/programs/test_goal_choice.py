@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.random_scenes import at, demonstrated, panda
 
-from onedemo.baselines.programs.goal_choice import Leg, choose, way_out
+from onedemo.baselines.programs.goal_choice import MotionChoice, choose, departure_path
 from onedemo.planner.errors import PlanFailed
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere
@@ -29,15 +29,15 @@ def goals(count=4, place=PLACE):
 
 
 def a_leg(obstacles=(), **changes):
-    return Leg("cup", demonstrated(), goals(), panda()[1], tuple(obstacles), **changes)
+    return MotionChoice("cup", demonstrated(), goals(), panda()[1], tuple(obstacles), **changes)
 
 
 def assert_clear(choice):
     plan = choice.plan
     log = MotionLog(
-        arm=plan.asked.arm, body=plan.asked.body, obstacles=plan.asked.obstacles, joints=plan.joints,
-        time=plan.dt * np.arange(len(plan.joints)), safety=SETTINGS.safety.distance, goal=plan.asked.goal,
-        allowed=plan.asked.allowed,
+        arm=plan.request.arm, body=plan.request.body, obstacles=plan.request.obstacles, joints=plan.joints,
+        time=plan.dt * np.arange(len(plan.joints)), safety=SETTINGS.safety.distance, goal=plan.request.goal,
+        allowed=plan.request.allowed,
     )  # fmt: skip
     certificate = certify(log)
     assert certificate.ok, certificate.reasons
@@ -47,11 +47,11 @@ def test_in_free_space_the_goal_with_most_joint_margin_is_taken():
     arm, _, home = panda()
     choice = choose(arm, SETTINGS, home, a_leg())
     plans = [Planner(arm, panda()[1]).plan(demonstrated(), home, goal) for goal in goals()]
-    margins = [plan.margin if plan.success and plan.kept > 0.9 else -1.0 for plan in plans]
+    margins = [plan.margin if plan.success and plan.imitated_share > 0.9 else -1.0 for plan in plans]
     assert choice.index == int(np.argmax(margins)) and choice.plan.success and choice.then is None
-    np.testing.assert_array_equal(choice.plan.asked.goal.dq, goals()[choice.index].dq)
-    assert choice.onward is None
-    assert [loosely for _, loosely in choice.parts] == [False]
+    np.testing.assert_array_equal(choice.plan.request.goal.dq, goals()[choice.index].dq)
+    assert choice.next_motion is None
+    assert [exact for _, exact in choice.parts] == [True]
 
 
 @pytest.mark.parametrize("quarter", [0, 1])
@@ -90,13 +90,18 @@ def test_a_goal_from_which_the_task_goes_on_beats_one_that_is_nearer():
             continue
         near = tuple(at([0.0, 0.0, 0.1]) @ goal for goal in goals())
 
-        def onward(index, wanted=wanted, near=near):
-            return Leg("cup", demonstrated(), near if index == wanted else far, body, (), leaving=demonstrated())
+        def next_motion(index, wanted=wanted, near=near):
+            return MotionChoice(
+                "cup", demonstrated(), near if index == wanted else far, body, (), leaving=demonstrated()
+            )
 
-        choice = choose(arm, replace(SETTINGS, search=None), home, a_leg(), onward)
+        choice = choose(arm, replace(SETTINGS, search=None), home, a_leg(), next_motion)
         assert choice.index == wanted and choice.then is not None and choice.then.plan.success
         np.testing.assert_array_equal(choice.then.plan.joints[0], choice.plan.joints[-1])
-        assert choice.onward is not None and choice.onward.path[-1].gap(choice.then.plan.asked.goal)[0] < 1e-9
+        assert (
+            choice.next_motion is not None
+            and choice.next_motion.path[-1].distance_to(choice.then.plan.request.goal)[0] < 1e-9
+        )
         return
     pytest.fail("no other goal can be reached")
 
@@ -124,15 +129,17 @@ def test_leaving_is_as_shown_or_straight_up_where_that_cannot_be():
     start = arm.fk(home)
     aside = screw_path(start, at([0.2, 0.0, 0.0]) @ start, 0.005)
     leg = a_leg(leaving=aside)
-    shown = way_out(arm, SETTINGS, home, leg)
-    assert shown is not None and way_out(arm, SETTINGS, home, a_leg()) is None
+    shown = departure_path(arm, SETTINGS, home, leg)
+    assert shown is not None and departure_path(arm, SETTINGS, home, a_leg()) is None
     np.testing.assert_allclose(shown[-1].position - start.position, [0.09, 0.0, 0.0], atol=5e-3)
     wall = Obstacle(Box((0.02, 0.3, 0.1)), at(start.position + np.array([0.1, 0.0, -0.02])), name="wall")
-    up = way_out(arm, SETTINGS, home, leg._replace(obstacles=(wall,)))
+    up = departure_path(arm, SETTINGS, home, leg._replace(obstacles=(wall,)))
     assert up is not None
     np.testing.assert_allclose(up[-1].position - start.position, [0.0, 0.0, 0.09], atol=1e-9)
     choice = choose(arm, SETTINGS, home, leg)
-    assert [loosely for _, loosely in choice.parts] == [True, False]
+    assert [exact for _, exact in choice.parts] == [False, True]
     np.testing.assert_array_equal(choice.parts[0][0].dqs, shown.dqs)
     np.testing.assert_array_equal(choice.tail.dqs, choice.parts[1][0].dqs)
-    assert choice.path[0].gap(start)[0] < 1e-9 and choice.path[-1].gap(choice.plan.asked.goal)[0] < 1e-9
+    assert (
+        choice.path[0].distance_to(start)[0] < 1e-9 and choice.path[-1].distance_to(choice.plan.request.goal)[0] < 1e-9
+    )

@@ -47,7 +47,7 @@ def test_the_shipped_demonstration_is_what_the_script_records(env):
     np.testing.assert_allclose(anew.joint_positions, SHOWN.joint_positions, atol=1e-6)
     assert (SHOWN.source, SHOWN.task, SHOWN.robot) == ("scripted", "pour", "Panda")
     for made, shipped in zip(anew.segments, SHOWN.segments, strict=True):
-        assert made.reference_pose.gap(shipped.reference_pose)[0] < 1e-6
+        assert made.reference_pose.distance_to(shipped.reference_pose)[0] < 1e-6
         assert replace(made, reference_pose=shipped.reference_pose) == shipped
 
 
@@ -117,7 +117,7 @@ def test_goals_keep_the_lip_over_the_rim_for_every_turn_and_every_hold(env):
         np.testing.assert_allclose(np.linalg.norm((lip - rim)[:2]), 0.028, atol=3e-3)
         assert lip[2] - rim[2] == pytest.approx(0.02, abs=3e-3)
         assert np.degrees(cup.tilt) == pytest.approx(115.0, abs=1.0)
-    assert turned_like(held, goals.held).inverse().gap(goals.held.inverse())[1] < 1e-6
+    assert turned_like(held, goals.held).inverse().distance_to(goals.held.inverse())[1] < 1e-6
 
 
 def test_a_recording_that_never_tilts_is_refused(tmp_path):

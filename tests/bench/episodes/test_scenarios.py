@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from onedemo.bench.episodes.scenarios import Suite, frozen, lists_of, place_of, read_suite
 from onedemo.bench.episodes.start_states import TOLERANCE, difference, obstacle
 from onedemo.configs.run_config import RunConfig
-from onedemo.envs.simulation.moving_obstacles import Intruder
+from onedemo.envs.simulation.moving_obstacles import ScheduledObstacle
 from onedemo.planner.geometry.shapes import Box, Capsule, Sphere
 
 CELL = RunConfig(name="x", task="stack", demonstration="stack", episodes=3)
@@ -91,10 +91,15 @@ def test_what_is_there_differs_from_what_is_not():
 
 def test_an_obstacle_is_described_as_it_is():
     turn = (math.cos(0.3), 0.0, 0.0, math.sin(0.3))
-    each = Intruder(Capsule(0.02, 0.05), (0.1, 0.2, -0.0), turn, long=(0.1, 0, 0), frequency=2.0, phase=1.0, motion=3)
+    each = ScheduledObstacle(
+        Capsule(0.02, 0.05), (0.1, 0.2, -0.0), turn, long=(0.1, 0, 0), frequency=2.0, phase=1.0, motion=3
+    )
     found = obstacle(each)
     assert (found["shape"], found["size"], found["motion"]) == ("capsule", [0.02, 0.02, 0.05], 3)
     assert math.copysign(1.0, found["center"][2]) == 1.0
     np.testing.assert_allclose(found["rotation"], turn, atol=1e-9)
     assert (found["long"], found["frequency"], found["phase"]) == ([0.1, 0.0, 0.0], 2.0, 1.0)
-    assert [obstacle(Intruder(s, (0, 0, 1)))["shape"] for s in (Sphere(0.1), Box((0.1, 0.2, 0.3)))] == ["sphere", "box"]
+    assert [obstacle(ScheduledObstacle(s, (0, 0, 1)))["shape"] for s in (Sphere(0.1), Box((0.1, 0.2, 0.3)))] == [
+        "sphere",
+        "box",
+    ]

@@ -13,12 +13,12 @@ from onedemo.baselines.motion.path_generators import straight_path
 from onedemo.bench.console import console
 from onedemo.bench.geometric import metrics
 from onedemo.bench.geometric.clearance import FAR, ToolJudge
-from onedemo.bench.geometric.command import Order, jobs_for, recorded, run_geometric, wanted_rows
+from onedemo.bench.geometric.command import GeometricRequest, jobs_for, recorded, run_geometric, wanted_rows
 from onedemo.bench.geometric.jobs import METHODS, GeometricJobs, frames_row, key_of, path_row, results_hash, sparse_row
 from onedemo.bench.geometric.parts import KINDS, part_named, robot, tool_of
 from onedemo.bench.geometric.suite import FILE, LEVELS, GeometricSuite, cells, drawn, read_suite
 from onedemo.bench.geometric.tables import is_kept
-from onedemo.envs.scene.body_clearance import tool_room
+from onedemo.envs.scene.body_clearance import tool_clearance
 from onedemo.planner.errors import BadConfig
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere, pack
@@ -50,12 +50,12 @@ def test_a_scenario_depends_on_seed_and_index_alone(suite):
 def test_both_ends_are_in_reach_and_clear_and_the_way_between_is_not(suite):
     for each in suite.scenarios:
         arm = robot().arm
-        distance, angle = arm.fk(np.array(each.joints)).gap(each.start)
+        distance, angle = arm.fk(np.array(each.joints)).distance_to(each.start)
         assert distance < 1e-3 and angle < 1e-2
         assert bool(each.obstacles) == (LEVELS[each.level].obstacles > 0)
         if each.obstacles:
             ends = np.array([each.start.dq, each.goal.dq])
-            assert tool_room(tool_of(each.part), ends, pack(each.obstacles)) > 0.02
+            assert tool_clearance(tool_of(each.part), ends, pack(each.obstacles)) > 0.02
 
 
 def test_what_is_written_is_what_was_drawn_and_a_changed_file_is_refused(suite, tmp_path):
@@ -71,7 +71,7 @@ def test_what_is_written_is_what_was_drawn_and_a_changed_file_is_refused(suite, 
 
 
 def test_every_method_is_asked_for_the_same_scenarios(suite):
-    order = Order(len(suite.lines), SEED, tuple(METHODS), 1)
+    order = GeometricRequest(len(suite.lines), SEED, tuple(METHODS), 1)
     asked = {}
     for track, variant, method, index in wanted_rows(suite, order):
         if not variant.startswith("tool, "):
@@ -86,7 +86,7 @@ def test_the_same_bits_in_processes_and_after_a_crash(suite, tmp_path):
     small = GeometricSuite(SEED, suite.lines[:2])
     small.write(tmp_path)
     methods, bench = ("tsia", "decoupled"), GeometricJobs()
-    order = Order(2, SEED, methods, 1)
+    order = GeometricRequest(2, SEED, methods, 1)
     here = [row for job in jobs_for(tmp_path, wanted_rows(small, order)) for row in bench.do(job)["rows"]]
     expected = {key_of(row): row for row in here}
     file = tmp_path / f"rows-{small.hash[:12]}.jsonl"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.bench.episodes.episode import judged, play, run_episode
+from onedemo.bench.episodes.episode import episode_record, play, run_episode
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.bench.metrics.carry_segments import carries, carrying_tilt, tilts
 from onedemo.bench.metrics.clearance import Solids
@@ -30,7 +30,7 @@ from onedemo.bench.metrics.trace import Trace, TraceRecorder
 from onedemo.bench.task_table import TASKS
 from onedemo.configs.grid import RunConfig
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.envs.simulation.moving_obstacles import Intruder
+from onedemo.envs.simulation.moving_obstacles import ScheduledObstacle
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Sphere
 from onedemo.planner.imitation.demonstration_files import load_demonstration
@@ -198,7 +198,7 @@ def test_fcl_and_the_simulator_agree_on_a_state(stack, seed):
     rng = np.random.default_rng(seed)
     place = tuple(rng.uniform([0.0, -0.35, 1.0], [0.3, 0.35, 1.4]))
     turn = rng.normal(size=4)
-    obstacle = Intruder(SHAPES[seed % 3], place, tuple(turn / np.linalg.norm(turn)))
+    obstacle = ScheduledObstacle(SHAPES[seed % 3], place, tuple(turn / np.linalg.norm(turn)))
     trace, info = recorded(env, seed, 0, [obstacle])
     found = solids.clearance(trace)
     assert found.smallest == pytest.approx(max(info["min_obstacle_distance"], 0.0), abs=1e-5)
@@ -208,8 +208,8 @@ def test_fcl_and_the_simulator_agree_on_a_state(stack, seed):
 def test_fcl_and_the_simulator_agree_on_an_episode(stack, seed):
     """Up to how far a link goes in one physics step, by which MuJoCo's poses are older than its joints."""
     env, solids = stack
-    swinging = Intruder(SHAPES[seed % 3], (0.25, 0.0, 1.25), long=(0.0, 0.1, 0.0), frequency=2.0)
-    still = Intruder(SHAPES[(seed + 1) % 3], (0.05, -0.35, 1.2))
+    swinging = ScheduledObstacle(SHAPES[seed % 3], (0.25, 0.0, 1.25), long=(0.0, 0.1, 0.0), frequency=2.0)
+    still = ScheduledObstacle(SHAPES[(seed + 1) % 3], (0.05, -0.35, 1.2))
     trace, info = recorded(env, seed, 120, [swinging, still])
     found = solids.clearance(trace)
     speed = np.abs(np.diff(trace.tcp[:, 0, :3], axis=0)).max() / trace.dt
@@ -220,7 +220,7 @@ def test_what_moves_is_met_where_it_is_at_that_tick(stack):
     """An obstacle that comes nearer to an arm at rest: the smallest distance is that of the last tick alone."""
     env, solids = stack
     recorder = TraceRecorder(env)
-    coming = Intruder(Sphere(0.05), (0.3, 0.0, 1.2), long=(0.0, 0.3, 0.0), frequency=1.0, phase=-1.2)
+    coming = ScheduledObstacle(Sphere(0.05), (0.3, 0.0, 1.2), long=(0.0, 0.3, 0.0), frequency=1.0, phase=-1.2)
     env.reset(seed=0, options={"obstacles": [coming]})
     recorder(env, None)
     for _ in range(25):
@@ -233,7 +233,7 @@ def test_what_moves_is_met_where_it_is_at_that_tick(stack):
 
 def test_clearance_without_culling_is_the_same(stack, monkeypatch):
     env, solids = stack
-    trace, _ = recorded(env, 3, 20, [Intruder(Sphere(0.05), (0.2, 0.1, 1.2))])
+    trace, _ = recorded(env, 3, 20, [ScheduledObstacle(Sphere(0.05), (0.2, 0.1, 1.2))])
     found = solids.clearance(trace)
     monkeypatch.setattr(
         Solids, "_at_least", lambda self, trace, ticks, *_: np.full((len(ticks), len(self.geoms)), -1.0)
@@ -246,7 +246,7 @@ def test_a_touch_is_a_clearance_of_zero(stack):
     env, solids = stack
     env.reset(seed=0)
     x, y, z = env.unwrapped.sim.read().tcp_pose[0, :3]
-    trace, info = recorded(env, 0, 0, [Intruder(Sphere(0.03), (x, y, z + 0.1))])
+    trace, info = recorded(env, 0, 0, [ScheduledObstacle(Sphere(0.03), (x, y, z + 0.1))])
     assert info["n_contacts"] == 1
     assert solids.clearance(trace).smallest == 0.0
 
@@ -255,13 +255,13 @@ def test_what_is_not_there_is_no_obstacle(stack):
     env, solids = stack
     trace, _ = recorded(env, 0, 3, [])
     assert solids.clearance(trace) == (None, None, None)
-    later = Intruder(Sphere(0.03), (0.2, 0.0, 1.2), motion=5)
+    later = ScheduledObstacle(Sphere(0.03), (0.2, 0.0, 1.2), motion=5)
     assert solids.clearance(recorded(env, 0, 3, [later])[0]) == (None, None, None)
 
 
 def test_a_trace_is_kept_in_a_file_to_single_precision(stack, tmp_path):
     env, solids = stack
-    trace, _ = recorded(env, 1, 30, [Intruder(Box((0.06, 0.1, 0.08)), (0.25, 0.0, 1.2))])
+    trace, _ = recorded(env, 1, 30, [ScheduledObstacle(Box((0.06, 0.1, 0.08)), (0.25, 0.0, 1.2))])
     trace.save(tmp_path / "deep" / "x.npz")
     again = Trace.load(tmp_path / "deep" / "x.npz")
     assert again.held.dtype == bool
@@ -283,7 +283,7 @@ def test_an_episode_is_recorded_with_its_metrics_and_trace(stack, tmp_path):
     env = gym.make("onedemo/Stack-v0", level="L3", max_episode_steps=20)
     config = RunConfig(name="x", task="stack", method="idle", demonstration="stack", level="L3")
     scenario = Scenario(4, 9, "L3")
-    record = judged(env, play(env, Idle(), scenario), scenario, config, tmp_path)
+    record = episode_record(env, play(env, Idle(), scenario), scenario, config, tmp_path)
     again, _ = run_episode(env, Idle(), Scenario(4, 9, "L3"), config)
     assert record.cell == config.digest()
     assert record.metrics == again.metrics

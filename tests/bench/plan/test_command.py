@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.arms import panda_urdf
 
-from onedemo.bench.drawing.convex_view import View, back_to_front, best_view, hull, solid_of, union
+from onedemo.bench.drawing.convex_view import DrawingView, back_to_front, best_view, hull, solid_of, union
 from onedemo.bench.drawing.solids import scale_ends
 from onedemo.bench.plan import command as plan_command
 from onedemo.bench.plan.command import NOT_FOUND, REFUSED, plan_in, run_plan, scene_path
@@ -119,7 +119,7 @@ def test_a_plan_is_refined_and_what_is_written_is_the_refined_one(smooth, timed,
 def test_a_plan_that_does_not_stay_clear_is_none(monkeypatch, capsys, tmp_path):
     good = planned("sphere")
     wall = Obstacle(Box((0.01, 0.01, 0.01)), good.arm.fk(good.plan.joints[len(good.plan.joints) // 2]), name="nail")
-    asked = good.plan.asked._replace(obstacles=(wall,))
+    asked = good.plan.request._replace(obstacles=(wall,))
     monkeypatch.setattr(plan_command, "plan_in", lambda scene: good._replace(plan=good.plan._replace(asked=asked)))
     assert run_plan("sphere", [], None, tmp_path / "plan.json", timed=True) == NOT_FOUND
     assert "sphere: plan_failed: the timed motion is not clear at" in capsys.readouterr().out
@@ -151,7 +151,7 @@ def test_nothing_that_matters_is_cut_off(name):
 
     content = content_of(planned(name))
     for azimuth in (-155, -35, 55, 145):
-        view = View(float(azimuth), 26.0)
+        view = DrawingView(float(azimuth), 26.0)
         low, high = window_of(content, view)
         scale = view.flat(scale_ends(view, *room_of(content)))
         for points in (scale, view.flat(content.executed), *[solid.outline(view) for solid in content.solids]):
@@ -303,7 +303,7 @@ def test_what_hides_what_agrees_with_walking_towards_the_viewer(shape):
 
     rng = np.random.default_rng(1)
     pose = Pose.from_position_quaternion([0.1, -0.2, 0.3], np.array([0.5, 0.5, -0.5, 0.5]))
-    solid, view = solid_of(shape, pose), View(35.0, 25.0)
+    solid, view = solid_of(shape, pose), DrawingView(35.0, 25.0)
     points = rng.uniform(-0.4, 0.4, (200, 3)) + pose.position
     inside = Delaunay(corner_points(shape) @ pose.rotation.T + pose.position)
     walk = points[:, None] + np.linspace(0.0, 1.2, 200)[:, None] * view.axes[2]
@@ -314,14 +314,14 @@ def test_what_hides_what_agrees_with_walking_towards_the_viewer(shape):
 
 
 def test_near_things_are_painted_after_far_ones():
-    view = View(0.0, 20.0)  # the viewer is at +x
+    view = DrawingView(0.0, 20.0)  # the viewer is at +x
     boxes = [solid_of(Box((0.01, 1.0, 1.0)), Pose.from_position_quaternion([x, 0, 0])) for x in (0.3, -0.2, 0.1)]
     ball = solid_of(Sphere(0.04), Pose.from_position_quaternion([0.2, 0.0, -0.4]))
     assert back_to_front([*boxes, ball], view) == [1, 2, 3, 0]
 
 
 def test_outlines_grow_by_the_shell_and_join_to_one_area():
-    view = View(30.0, 20.0)
+    view = DrawingView(30.0, 20.0)
     ball = solid_of(Sphere(0.1), Pose.identity())
     far = np.linalg.norm(ball.outline(view, 0.05), axis=1)
     assert far == pytest.approx(0.15)

@@ -90,7 +90,7 @@ def test_what_is_in_the_hand_from_the_start_stays_there(name, robot):
         for _ in range(30):
             observation, _, _, _, info = env.step(closed(env))
         hand = Pose.from_vector(observation["tcp_pose"][0])
-        distance, angle = before.gap(hand.inverse() @ Pose.from_vector(observation["object_pose"][0]))
+        distance, angle = before.distance_to(hand.inverse() @ Pose.from_vector(observation["object_pose"][0]))
         assert observation["motion_index"][0] == 1 and info["safe"]
         assert distance < 0.004 and angle < 0.05
 
@@ -285,7 +285,7 @@ def test_gaps_are_those_of_poses(numbers):
     turned = np.array([1.0, *numbers[3:]])
     b = Pose.from_position_quaternion(np.zeros(3), turned / np.linalg.norm(turned))
     distance, angle = gaps(a.vector, b.vector, half_turns=False)
-    assert (distance, angle) == pytest.approx(a.gap(b), abs=1e-6)
+    assert (distance, angle) == pytest.approx(a.distance_to(b), abs=1e-6)
 
 
 def test_the_goal_forms_dense_reward_has_the_shape_of_the_other(goal_envs):

@@ -206,7 +206,7 @@ def test_a_source_in_the_hand_from_the_start_stays_there():
         observation, info = env.reset(seed=seed, options={"level": "L2"})
         assert observation["motion_index"] == 1.0 and info["safe"]
         held = Pose.from_vector(observation["tcp_pose"][0]).inverse() @ Pose.from_vector(observation["object_pose"][0])
-        assert held.gap(tcp_from_glass(GLASSES[SOURCE]))[0] < 1e-3
+        assert held.distance_to(tcp_from_glass(GLASSES[SOURCE]))[0] < 1e-3
         for _ in range(25):
             observation, *_, info = env.step(np.append(np.zeros(7), 1.0))
         assert observation["motion_index"] == 1.0 and info["safe"]

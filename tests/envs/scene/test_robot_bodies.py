@@ -53,10 +53,10 @@ def link_corners(model, data, body):
 
 def outside(body, arm, q, joint, corners):
     """How far [m] the farthest corner is outside of all capsules that move with a joint."""
-    from onedemo.planner.collision.robot_arrays import WORLD, place_capsules, robot_work
+    from onedemo.planner.collision.robot_arrays import WORLD, place_capsules, robot_arrays
     from onedemo.planner.geometry.shapes import pack
 
-    g = robot_work((arm,), (body,), pack(()))
+    g = robot_arrays((arm,), (body,), pack(()))
     place_capsules(g, q, WORLD)
     best = np.full(len(corners), np.inf)
     for k in np.flatnonzero(body.rows[:, 0] == joint):

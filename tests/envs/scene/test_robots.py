@@ -11,7 +11,7 @@ from helpers.reach import PourReach, ShelfReach
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.pour.places import POUR_PLACES
 from onedemo.envs.scene.baxter_trunk import slices
-from onedemo.envs.scene.body_clearance import arm_room
+from onedemo.envs.scene.body_clearance import arm_clearance
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.robot_description import PARKED
 from onedemo.envs.scene.robots import ROBOTS, places_of
@@ -21,7 +21,7 @@ from onedemo.envs.shelve.places import SHELF_PLACES
 from onedemo.envs.simulation.simulation import Simulation, Start
 from onedemo.envs.stack.rules import allowed_contact
 from onedemo.planner.collision.robot_arrays import WORLD as CAPSULES
-from onedemo.planner.collision.robot_arrays import place_capsules, robot_work
+from onedemo.planner.collision.robot_arrays import place_capsules, robot_arrays
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.geometry.shapes import pack
 
@@ -87,7 +87,7 @@ def test_the_capsules_hold_the_collision_geometry(robot, side):
     scene = compiled_scene(robot, NOTHING, (side,))
     index, data, rng = scene.arms[0], mujoco.MjData(scene.model), np.random.default_rng(2)
     body = robot_body(robot, list(ROBOTS[robot].ready).index(side))
-    g = robot_work((index.arm,), (body,), pack(()))
+    g = robot_arrays((index.arm,), (body,), pack(()))
     joints = [int(scene.model.joint(name).bodyid[0]) for name in index.arm.joint_names]
     for _ in range(5):
         q = rng.uniform(index.arm.lower, index.arm.upper)
@@ -160,7 +160,7 @@ def test_the_other_arm_is_parked_and_known(side):
     assert abs(env.arms[0].chain[0, 5]) < 1e-3
     # and starts well clear of all that it must not touch
     solids = [f for f in task.fixtures if f.name != "torso"]
-    assert arm_room(env.arms[0], task.bodies[0], scene.home[0], pack(solids)) > 0.05
+    assert arm_clearance(env.arms[0], task.bodies[0], scene.home[0], pack(solids)) > 0.05
 
 
 def test_an_arm_may_not_touch_trunk_nor_other_arm():
@@ -178,9 +178,11 @@ def test_the_slices_of_the_trunk_leave_the_shoulder_its_room():
     torso = pack([fixture for fixture in scene.fixtures if fixture.name == "torso"])
     arm, body = scene.arms[0].arm, robot_body("Baxter")
     upper = range(2, 3)
-    inwards = [arm_room(arm, body, np.array([s0, -0.6, 0, 1, 0, 0, 0]), torso, upper) for s0 in (-1.2, 0.0, 1.2)]
+    inwards = [arm_clearance(arm, body, np.array([s0, -0.6, 0, 1, 0, 0, 0]), torso, upper) for s0 in (-1.2, 0.0, 1.2)]
     assert min(inwards) > 0.05
-    assert arm_room(arm, body, np.array([1.7, 1.04, 0, 2.4, 0, 0, 0]), torso, upper) < 0.0, "a real collision stays one"
+    assert arm_clearance(arm, body, np.array([1.7, 1.04, 0, 2.4, 0, 0, 0]), torso, upper) < 0.0, (
+        "a real collision stays one"
+    )
 
 
 def test_slices_hold_all_of_the_surface():
@@ -235,7 +237,7 @@ def test_it_starts_clear_of_everything_and_moves_in_the_task(task, robot):
             assert info["safe"]
             assert np.abs(inner.sim.data.contact.dist).max(initial=0.0) < 1e-3, "nothing is inside anything"
             q = observation["joint_positions"][0]
-            assert arm_room(inner.arms[0], inner.task.bodies[0], q, pack(fixtures), range(2, len(q))) > 0.02
+            assert arm_clearance(inner.arms[0], inner.task.bodies[0], q, pack(fixtures), range(2, len(q))) > 0.02
     for _ in range(50):
         observation, *_ = env.step(rng.uniform(-1, 1, env.action_space.shape))
         assert env.observation_space.contains(observation)

@@ -15,12 +15,20 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.baselines.programs.world_model import intruders_of
-from onedemo.envs.core.obstacle_placement import FASTEST, LARGEST, NEAR, SMALLEST, START_ROOM, Leg, Stage
+from onedemo.baselines.programs.world_model import obstacles_in
+from onedemo.envs.core.obstacle_placement import (
+    FASTEST,
+    LARGEST,
+    NEAR,
+    SMALLEST,
+    START_CLEARANCE,
+    PlacementContext,
+    PlacementMotion,
+)
 from onedemo.envs.scene.body_clearance import capsule_ends
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import ARM, FINGERS, compiled_scene
-from onedemo.envs.simulation.moving_obstacles import ROOM, Intruder
+from onedemo.envs.simulation.moving_obstacles import CLEARANCE, ScheduledObstacle
 from onedemo.planner.errors import OneDemoError
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Obstacle, Sphere, pack
@@ -95,7 +103,9 @@ def test_the_velocity_is_the_derivative_of_the_place_and_never_faster_than_its_p
     rng = np.random.default_rng(seed)
     long, short = rng.normal(size=3), np.zeros(3)
     short = 0.2 * np.cross(long, rng.normal(size=3))
-    each = Intruder(Sphere(0.1), (0, 0, 1), long=tuple(long), short=tuple(short), frequency=rng.uniform(0.1, 3))
+    each = ScheduledObstacle(
+        Sphere(0.1), (0, 0, 1), long=tuple(long), short=tuple(short), frequency=rng.uniform(0.1, 3)
+    )
     peak = each.frequency * max(np.linalg.norm(long), np.linalg.norm(short))
     for time in rng.uniform(0, 20, 10):
         slope = (each.position(time + 1e-5) - each.position(time - 1e-5)) / 2e-5
@@ -112,7 +122,7 @@ def test_an_obstacle_is_as_large_in_the_physics_as_it_is_said_to_be(env, shape):
         # its lowest point is put above or below the top of a block
         block = np.array(env.reset(seed=0, options={"level": "L0", "obstacles": "none"})[0]["object_pose"][0])
         center = (block[0], block[1], block[2] + 0.025 + gap - lowest)
-        started(env, Intruder(shape, center, tuple(turned.quaternion)))
+        started(env, ScheduledObstacle(shape, center, tuple(turned.quaternion)))
         *_, info = env.step(IDLE)
         assert (info["n_contacts"] > 0) == touches
 
@@ -120,7 +130,7 @@ def test_an_obstacle_is_as_large_in_the_physics_as_it_is_said_to_be(env, shape):
 def test_an_arm_does_not_get_through_and_it_counts_as_a_contact(env):
     observation, _ = started(env)
     tcp = observation["tcp_pose"][0]
-    wall = Intruder(Box((0.02, 0.6, 0.5)), (tcp[0] + 0.15, tcp[1], tcp[2]))
+    wall = ScheduledObstacle(Box((0.02, 0.6, 0.5)), (tcp[0] + 0.15, tcp[1], tcp[2]))
     driven = gym.make("onedemo/Stack-v0", control_mode="ee_twist").unwrapped
     reached = {}
     for there, options in ((False, []), (True, [wall])):
@@ -139,7 +149,7 @@ def test_an_arm_does_not_get_through_and_it_counts_as_a_contact(env):
 @each_shape
 def test_the_distance_told_is_the_smallest_of_all_pairs_so_far(env, shape):
     rng = np.random.default_rng(1)
-    started(env, Intruder(shape, (-0.05, 0.2, 1.1), long=(0.0, 0.1, 0.0), frequency=2.0))
+    started(env, ScheduledObstacle(shape, (-0.05, 0.2, 1.1), long=(0.0, 0.1, 0.0), frequency=2.0))
     smallest = brute_distance(env)
     for _ in range(40):
         *_, info = env.step(rng.uniform(-0.5, 0.5, 8))
@@ -153,7 +163,7 @@ def test_distances_are_those_of_another_library_also_where_mujoco_says_zero(env)
         turn = rng.normal(size=4)
         shape = Box(tuple(rng.uniform(0.03, 0.1, 3)))
         place = rng.uniform([-0.4, -0.4, 0.9], [0.2, 0.4, 1.5])
-        each = Intruder(shape, tuple(place), tuple(turn / np.linalg.norm(turn)))
+        each = ScheduledObstacle(shape, tuple(place), tuple(turn / np.linalg.norm(turn)))
         *_, info = env.reset(seed=seed, options={"level": "L2", "obstacles": [each]})
         expected = brute_distance(env)
         if expected > 0.0:
@@ -176,13 +186,13 @@ def test_what_is_not_there_is_zeros_and_what_is_there_is_told_in_full(env):
     observation, _ = started(env)
     for key in ("active", "shape", "size", "pose", "velocity"):
         assert not observation[f"obstacle_{key}"].any()
-    still = Intruder(Box((0.04, 0.05, 0.06)), (0.1, 0.3, 1.2), (0.8, 0.6, 0.0, 0.0))
-    swing = Intruder(Sphere(0.03), (0.0, -0.3, 1.2), long=(0.1, 0.0, 0.0), frequency=2.0)
+    still = ScheduledObstacle(Box((0.04, 0.05, 0.06)), (0.1, 0.3, 1.2), (0.8, 0.6, 0.0, 0.0))
+    swing = ScheduledObstacle(Sphere(0.03), (0.0, -0.3, 1.2), long=(0.1, 0.0, 0.0), frequency=2.0)
     started(env, still, swing)
     for step in range(1, 30):
         observation, *_ = env.step(IDLE)
         time = step * env.control_dt
-        seen = intruders_of(observation)
+        seen = obstacles_in(observation)
         assert observation["obstacle_active"].tolist() == [1, 1, 0]
         assert seen[0].shape == still.shape and seen[1].shape == swing.shape
         np.testing.assert_allclose(observation["obstacle_pose"][0], still.pose(0).vector, atol=1e-12)
@@ -195,9 +205,9 @@ def test_what_is_not_there_is_zeros_and_what_is_there_is_told_in_full(env):
 def test_one_that_appears_waits_for_its_motion_its_delay_and_for_room(env, monkeypatch):
     observation, _ = started(env)
     tcp = tuple(observation["tcp_pose"][0, :3])
-    later = Intruder(Sphere(0.04), (0.1, 0.3, 1.3), motion=1, delay=0.5)
-    never = Intruder(Sphere(0.04), (0.1, -0.3, 1.3), motion=3)
-    blocked = Intruder(Sphere(0.04), tcp, motion=1)
+    later = ScheduledObstacle(Sphere(0.04), (0.1, 0.3, 1.3), motion=1, delay=0.5)
+    never = ScheduledObstacle(Sphere(0.04), (0.1, -0.3, 1.3), motion=3)
+    blocked = ScheduledObstacle(Sphere(0.04), tcp, motion=1)
     started(env, later, never, blocked)
     index = property(lambda _: 1.0 if env._steps >= 10 else 0.0)
     monkeypatch.setattr(type(env._progress), "motion_index", index)
@@ -219,7 +229,7 @@ def test_levels_put_seeded_obstacles_that_leave_room_at_the_start(env, level, ki
             assert (extents <= LARGEST + 1e-9).all() and (extents >= 0.4 * SMALLEST).all()
         if env.sim.obstacles.active.any():
             # the rule keeps capsules this far, and they contain the collision geometry
-            assert info["min_obstacle_distance"] >= START_ROOM - 1e-6
+            assert info["min_obstacle_distance"] >= START_CLEARANCE - 1e-6
         again, _ = env.reset(seed=seed, options={"level": level})
         for key, value in first.items():
             np.testing.assert_array_equal(value, again[key])
@@ -246,7 +256,7 @@ NARROW = [[0.1, y, 0.825, 1, 0, 0, 0] for y in (-0.13, 0.0, 0.13)]
     [
         ({"obstacles": "wall"}, "unknown obstacles 'wall'; known: none, static"),
         ({"obstacles": [1]}, "neither one of none, static"),
-        ({"obstacles": [Intruder(Sphere(0.1), (0, 0, 1))] * 4}, "there are 4; at most 3"),
+        ({"obstacles": [ScheduledObstacle(Sphere(0.1), (0, 0, 1))] * 4}, "there are 4; at most 3"),
         ({"level": "L3", "object_poses": NARROW, "base_pose": [-0.08, 0, 0.825, 1, 0, 0, 0]}, "no room for 'static'"),
     ],
 )
@@ -260,8 +270,8 @@ def test_nothing_appears_nearer_than_promised(monkeypatch):
     env = gym.make("onedemo/Stack-v0").unwrapped
     observation, _ = started(env)
     x, y, z = observation["tcp_pose"][0, :3]
-    for offset, room in ((ROOM + 0.02, True), (ROOM - 0.03, False)):
-        started(env, Intruder(Sphere(0.02), (x, y, z - 0.02 - offset), motion=1))
+    for offset, room in ((CLEARANCE + 0.02, True), (CLEARANCE - 0.03, False)):
+        started(env, ScheduledObstacle(Sphere(0.02), (x, y, z - 0.02 - offset), motion=1))
         monkeypatch.setattr(type(env._progress), "motion_index", property(lambda _: 1.0))
         env.step(IDLE)
         assert env.sim.obstacles.active[0] == room
@@ -274,8 +284,10 @@ def a_stage(straight=1):
     joints = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
     tcp = arm.fk(joints)
     keys = [Pose.from_position_quaternion([0.05 * k, 0.0, 0.0]) @ tcp for k in range(3)]
-    leg = Leg(tcp, keys[-1], tuple((key,) for key in keys), Sphere(0.01), Pose.identity(), 0, straight=straight)
-    return Stage([leg], arm, body, joints, [], [], 0.0), keys
+    leg = PlacementMotion(
+        tcp, keys[-1], tuple((key,) for key in keys), Sphere(0.01), Pose.identity(), 0, straight=straight
+    )
+    return PlacementContext([leg], arm, body, joints, [], [], 0.0), keys
 
 
 def test_obstacles_that_each_leave_a_posture_but_together_none_are_seen():
@@ -299,6 +311,6 @@ def test_what_is_straight_is_reached_in_one_posture():
     for line in lines:
         assert len(line) == 3 and np.abs(np.diff(line, axis=0)).max() <= NEAR
         for q, key in zip(line, keys, strict=True):
-            assert max(stage.arm.fk(q).gap(key)) < 1e-3
+            assert max(stage.arm.fk(q).distance_to(key)) < 1e-3
     apart, _ = a_stage()
     assert [len(line) for k in range(3) for line in apart._postures_at(k)[:1]] == [1, 1, 1]

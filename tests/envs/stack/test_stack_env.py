@@ -285,7 +285,7 @@ def test_the_observed_tool_is_the_forward_kinematics_of_the_observed_joints(env)
     for _ in range(50):
         observation, *_ = env.step(rng.uniform(-1, 1, 8))
         expected = env.arms[0].fk(observation["joint_positions"][0])
-        distance, angle = Pose.from_vector(observation["tcp_pose"][0]).gap(expected)
+        distance, angle = Pose.from_vector(observation["tcp_pose"][0]).distance_to(expected)
         assert distance < 1e-9
         assert angle < 1e-7
 

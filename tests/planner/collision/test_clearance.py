@@ -24,14 +24,14 @@ from onedemo.planner.collision.clearance import (
     bound_motion,
     capsule_distance,
     find_near,
-    least_room,
+    min_slack,
+    near_pair_slack,
     obstacle_distance,
     reach_of,
-    room_at,
-    room_of_near,
+    slack_at,
     step_stays_clear,
 )
-from onedemo.planner.collision.edge_certificates import is_clear, tool_room, tool_work
+from onedemo.planner.collision.edge_certificates import is_clear, tool_arrays, tool_slack
 from onedemo.planner.collision.robot_arrays import (
     BOUNDS,
     HEADER,
@@ -46,7 +46,7 @@ from onedemo.planner.collision.robot_arrays import (
     W_REACH,
     WORLD,
     place_capsules,
-    robot_work,
+    robot_arrays,
 )
 from onedemo.planner.geometry import screw
 from onedemo.planner.geometry.pose import Pose
@@ -64,7 +64,7 @@ SETTING = SafetySettings(distance=0.01, self_distance=0.015, shell=0.5)
 
 
 def work_of(arm: Arm, body: Body, obstacles, pairs=(), masks=(), setting: SafetySettings = SETTING) -> np.ndarray:
-    return robot_work(
+    return robot_arrays(
         [arm],
         [body],
         pack(obstacles),
@@ -117,7 +117,7 @@ def test_the_near_pairs_are_all_that_are_near(seed, shell):
         assert found[pair] == pytest.approx(gap, abs=1e-12)
     rooms = [gap - (SETTING.self_distance if pair[0] else SETTING.distance) for pair, gap in wanted.items()]
     if rooms:
-        assert least == pytest.approx(min(rooms), abs=1e-12) == pytest.approx(room_of_near(g, -1, 0.0), abs=1e-12)
+        assert least == pytest.approx(min(rooms), abs=1e-12) == pytest.approx(near_pair_slack(g, -1, 0.0), abs=1e-12)
     assert all(r[KEEP] == (SETTING.self_distance if r[KIND] else SETTING.distance) for r in near_rows(g))
 
 
@@ -128,9 +128,9 @@ def test_the_smallest_room_is_that_of_all_pairs_up_to_the_cutoff(seed, cutoff):
     place_capsules(g, q, WORLD)
     rooms = [gap - (SETTING.self_distance if pair[0] else SETTING.distance) for pair, gap in all_gaps(g).items()]
     least = min([100.0, *rooms])
-    assert room_at(g, q, 0.0, 100.0) == pytest.approx(least, abs=1e-12)
-    assert room_at(g, q, 0.0, cutoff) == pytest.approx(min(least, cutoff), abs=1e-12)
-    assert least_room(g, WORLD, 0.0, 100.0) == room_at(g, q, 0.0, 100.0)
+    assert slack_at(g, q, 0.0, 100.0) == pytest.approx(least, abs=1e-12)
+    assert slack_at(g, q, 0.0, cutoff) == pytest.approx(min(least, cutoff), abs=1e-12)
+    assert min_slack(g, WORLD, 0.0, 100.0) == slack_at(g, q, 0.0, 100.0)
 
 
 @for_all(seeds, max_examples=40)
@@ -217,7 +217,7 @@ def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
     """Both Pandas, against an obstacle and against each other."""
     robot, rng = facing_pandas(), np.random.default_rng(0)
     ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.4, 0, 0.4]))
-    g = robot_work(
+    g = robot_arrays(
         robot.arms, robot.bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SETTING.packed(0.01)
     )
     checked = 0
@@ -313,7 +313,7 @@ def proven(g, q, step, dt: float) -> bool:
 
 
 def worst_room(g, q, step, dt: float, count: int = 200) -> float:
-    return min(room_at(g, q + s * step, s * dt, 0.1) for s in np.linspace(0, 1, count + 1))
+    return min(slack_at(g, q + s * step, s * dt, 0.1) for s in np.linspace(0, 1, count + 1))
 
 
 def test_a_step_that_is_proven_clear_is_clear():
@@ -323,7 +323,7 @@ def test_a_step_that_is_proven_clear_is_clear():
         g, arm, _, rng = robot(seed, moving=bool(seed % 2))
         for _ in range(20):
             q = rng.uniform(-2, 2, arm.dof)
-            if room_at(g, q, 0.0, 1.0) < 2e-4:
+            if slack_at(g, q, 0.0, 1.0) < 2e-4:
                 continue
             step, dt = rng.normal(size=arm.dof) * rng.choice([0.01, 0.1, 0.5]), float(rng.choice([0.01, 0.2]))
             answer = proven(g, q, step, dt)
@@ -340,7 +340,7 @@ def test_a_step_with_room_to_spare_is_proven_clear():
         g, arm, _, rng = robot(seed, moving=bool(seed % 2))
         for _ in range(10):
             q, step = rng.uniform(-2, 2, arm.dof), 0.03 * rng.normal(size=arm.dof)
-            if room_at(g, q, 0.0, 1.0) > 2e-3 and worst_room(g, q, step, 0.02, 50) > 2e-3:
+            if slack_at(g, q, 0.0, 1.0) > 2e-3 and worst_room(g, q, step, 0.02, 50) > 2e-3:
                 asked += 1
                 refused += not proven(g, q, step, 0.02)
     assert asked > 200 and refused <= 0.01 * asked
@@ -400,7 +400,7 @@ def test_sliding_along_a_plane_is_proven_however_long():
 def test_a_pass_by_a_small_ball_is_not_proven_by_two_distances_that_suffice_for_contact():
     g = work_of(gantry(), POINT, [Obstacle(Sphere(0.001))])
     q, step = np.array([-0.008, 0.0, 0.030]), np.array([0.016, 0.0, 0.0])
-    assert room_at(g, q, 0.0, 1.0) > 0 and worst_room(g, q, step, 1.0) < -9e-4
+    assert slack_at(g, q, 0.0, 1.0) > 0 and worst_room(g, q, step, 1.0) < -9e-4
     assert not proven(g, q, step, 1.0)
 
 
@@ -482,7 +482,7 @@ def test_a_robot_does_not_hit_itself_within_a_step():
     for _ in range(3000):
         q = rng.uniform(arm.lower, arm.upper)
         step = rng.normal(size=7) * rng.choice([0.02, 0.2])
-        if room_at(g, q, 0.0, 1.0) > 2e-4:
+        if slack_at(g, q, 0.0, 1.0) > 2e-4:
             answer = proven(g, q, step, 0.05)
             seen[answer] += 1
             if answer:
@@ -493,7 +493,7 @@ def test_a_robot_does_not_hit_itself_within_a_step():
 def test_an_edge_past_a_small_ball_and_a_turn_through_a_plate_are_not_proven():
     """A slide that comes a little too close half-way, from far and near; a turn on the spot, at the end of a rod."""
     ball = pack([Obstacle(Sphere(0.001))])
-    g = tool_work(np.array([[0, 0, 0, 0, 0, 0, 0.02]]), ball, margin=0.01)
+    g = tool_arrays(np.array([[0, 0, 0, 0, 0, 0, 0.02]]), ball, margin=0.01)
     for height in (0.001, 0.02, 0.029, 0.0305):
         for reach in (0.04, 0.1, 0.5, 2.0):
             x, y = (tuple(Pose.from_position_quaternion([side * reach, 0, height]).dq) for side in (-1, 1))
@@ -501,7 +501,7 @@ def test_an_edge_past_a_small_ball_and_a_turn_through_a_plate_are_not_proven():
     x, y = (tuple(Pose.from_position_quaternion([side, 0, 0.0315]).dq) for side in (-1, 1))
     assert is_clear(g, x, y, 0.01)
     plate = pack([Obstacle(Box((1.0, 0.001, 1.0)), Pose.from_position_quaternion([0.6, 0, 0]))])
-    g = tool_work(np.array([[0.3, 0, 0, 0.3, 0, 0, 0.02]]), plate, margin=0.01)
+    g = tool_arrays(np.array([[0.3, 0, 0, 0.3, 0, 0, 0.02]]), plate, margin=0.01)
     x, y, away = (
         tuple(Pose.from_position_quaternion(np.zeros(3), [np.cos(a), 0, 0, np.sin(a)]).dq) for a in (-0.3, 0.5, -0.9)
     )
@@ -515,7 +515,7 @@ def test_an_edge_of_a_tool_that_is_proven_clear_is_clear(turning):
     for seed in range(max(25, round(60 * SHARE))):
         rng = np.random.default_rng(seed)
         tool = np.column_stack([rng.uniform(-0.1, 0.1, (2, 6)), [0.03, 0.02]])
-        g = tool_work(tool, pack(random_obstacles(rng)), margin=0.01)
+        g = tool_arrays(tool, pack(random_obstacles(rng)), margin=0.01)
         for _ in range(10):
             x = random_pose(rng, rng.uniform(-0.6, 0.6, 3))
             way = random_pose(rng) if turning else Pose.identity()
@@ -532,7 +532,7 @@ def test_an_edge_of_a_tool_that_is_proven_clear_is_clear(turning):
                 twist = screw.twist_of(screw.mul(screw.conj(x), y))
                 places = np.linspace(0, 1, 201 if SHARE >= 1 else 51)
                 poses = [screw.mul(x, screw.from_twist(screw.scaled(twist, s))) for s in places]
-                rooms = [tool_room(g, pose, 0.02) for pose in poses]
+                rooms = [tool_slack(g, pose, 0.02) for pose in poses]
                 assert not answer or min(rooms) >= -1e-9
                 refused += not answer and min(rooms) > 1e-3
     assert SHARE < 1 or (min(counts) > 30 and refused <= 3)
@@ -554,7 +554,7 @@ def test_the_clearance_does_not_depend_on_the_frame_of_the_world():
     for _ in range(50):
         q = rng.uniform(-2, 2, 5)
         one, other = work_of(arm, body, obstacles), work_of(there, body, elsewhere)
-        assert room_at(one, q, 0.0, 9.0) == pytest.approx(room_at(other, q, 0.0, 9.0), abs=1e-9)
+        assert slack_at(one, q, 0.0, 9.0) == pytest.approx(slack_at(other, q, 0.0, 9.0), abs=1e-9)
 
 
 def test_later_means_where_the_obstacle_will_be():
@@ -562,7 +562,7 @@ def test_later_means_where_the_obstacle_will_be():
     g = work_of(gantry(), POINT, [ball])
     for seconds in (0.0, 0.5, 1.0):
         later = work_of(gantry(), POINT, [ball.at(seconds)])
-        here = room_at(g, np.zeros(3), seconds, 9.0)
-        assert here == pytest.approx(room_at(later, np.zeros(3), 0.0, 9.0), abs=1e-12)
+        here = slack_at(g, np.zeros(3), seconds, 9.0)
+        assert here == pytest.approx(slack_at(later, np.zeros(3), 0.0, 9.0), abs=1e-12)
         assert here == pytest.approx(np.linalg.norm(ball.at(seconds).pose.position) - 0.13, abs=1e-12)
     assert g[SETTINGS, SELF_MARGIN] == 0.015

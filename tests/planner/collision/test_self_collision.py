@@ -10,7 +10,7 @@ from helpers.random_scenes import SETTINGS, demonstrated, panda, problem, solve
 from onedemo.envs.scene.scene import ARM, FINGERS, compiled_scene
 from onedemo.planner.collision.self_collision import body_pairs
 from onedemo.planner.planning.planner import Planner
-from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.robot.body_readers import resting_pairs
 
 FOLDED = np.array([1.22, 1.17, -2.16, -2.73, 2.41, 0.67, -0.48])
@@ -36,8 +36,8 @@ def within_gripper(pair):
 def test_a_hand_on_its_forearm_is_a_collision_for_both():
     arm, body, _ = panda()
     assert contacts_with_itself(FOLDED)
-    room = SceneWork.of(arm, body, (), SETTINGS)
-    assert room.room(FOLDED) < 0.0
+    room = PlanningScene.of(arm, body, (), SETTINGS)
+    assert room.slack(FOLDED) < 0.0
     plan = Planner(arm, body).plan(demonstrated(), FOLDED, demonstrated()[-1])
     assert plan.reason == "start in collision" and "link5" in plan.detail and "hand" in plan.detail
 
@@ -45,8 +45,8 @@ def test_a_hand_on_its_forearm_is_a_collision_for_both():
 def test_where_the_planner_has_room_mujoco_has_no_contact():
     """The capsules contain the links: of 1500 postures none that is clear for the planner touches for MuJoCo."""
     arm, body, _ = panda()
-    scene, rng = SceneWork.of(arm, body, (), SETTINGS), np.random.default_rng(0)
-    clear = [q for q in rng.uniform(arm.lower, arm.upper, (1500, 7)) if scene.room(q) >= 0.0]
+    scene, rng = PlanningScene.of(arm, body, (), SETTINGS), np.random.default_rng(0)
+    clear = [q for q in rng.uniform(arm.lower, arm.upper, (1500, 7)) if scene.slack(q) >= 0.0]
     assert len(clear) > 500
     assert not [q for q in clear if contacts_with_itself(q)]
 
@@ -66,4 +66,4 @@ def test_pairs_are_looked_at_or_rest_and_neighbors_always_rest():
     names = {(body.names[i], body.names[j]) for i, j in looked}
     assert {("link5", "hand"), ("link0", "hand"), ("link2", "fingers")} <= names
     assert not any(abs(i - j) <= 1 for i, j in looked if body.rows[i, 0] == body.rows[j, 0])
-    assert SceneWork.of(arm, body, (), SETTINGS).room(home) > 0.0
+    assert PlanningScene.of(arm, body, (), SETTINGS).slack(home) > 0.0

@@ -36,7 +36,7 @@ def test_a_followed_path_ends_at_its_end(seed):
     arm, path = a_path(seed)
     result = Pursuit(arm, path, DT).roll_out(READY)
     assert (result.arrived, result.reason) == (True, "")
-    distance, angle = arm.fk(result.q).gap(path[-1])
+    distance, angle = arm.fk(result.q).distance_to(path[-1])
     assert distance <= 1e-3
     assert angle <= 1e-2
     assert result.margin <= min(arm.margin(q) for q in result.trace) + 1e-12
@@ -74,7 +74,7 @@ def test_ideal_tracking_is_the_recurrence_of_screw_steps_and_ends_at_the_end(tau
     pursuit = Pursuit(arm, path, dt, controller=chosen, settings=PursuitSettings(tau=tau, capture_radius=radius))
     c, q, index, checked = path[0].dq, READY, 0, Counter()
     for _ in range(4000):
-        while index < len(path) - 1 and np.hypot(*np.array(dq.gap(c, path[index].dq)) * [1, 0.2]) <= radius:
+        while index < len(path) - 1 and np.hypot(*np.array(dq.pose_distance(c, path[index].dq)) * [1, 0.2]) <= radius:
             index += 1
         status, qdot = pursuit.step(q)
         assert pursuit.index == index
@@ -88,7 +88,7 @@ def test_ideal_tracking_is_the_recurrence_of_screw_steps_and_ends_at_the_end(tau
     assert status == ARRIVED
     assert sum(checked.values()) > 20
     assert len(checked) > 5
-    distance, angle = dq.gap(c, path[-1].dq)
+    distance, angle = dq.pose_distance(c, path[-1].dq)
     assert distance <= 1e-3
     assert angle <= 1e-2
 
@@ -100,7 +100,7 @@ def test_the_papers_tau_of_a_hundredth_ends_within_tolerance():
         controller = ControllerSettings(gain=gain)
         result = Pursuit(arm, path, dt, controller=controller, settings=settings_).roll_out(READY, max_seconds=200.0)
         assert (result.arrived, result.reason) == (True, "")
-        assert (np.array(arm.fk(result.q).gap(path[-1])) <= [1e-3, 1e-2]).all()
+        assert (np.array(arm.fk(result.q).distance_to(path[-1])) <= [1e-3, 1e-2]).all()
 
 
 def test_the_reference_is_the_first_pose_beyond_the_capture_radius():
@@ -110,7 +110,7 @@ def test_the_reference_is_the_first_pose_beyond_the_capture_radius():
     while True:
         x = arm.fk(q).dq
         status, qdot = pursuit.step(q)
-        distance, angle = dq.gap(x, path.dqs)
+        distance, angle = dq.pose_distance(x, path.dqs)
         screw_length = np.hypot(distance, 0.2 * angle)
         if pursuit.index < len(path) - 1:
             assert screw_length[pursuit.index] > 0.012
@@ -159,13 +159,13 @@ def test_out_of_reach_is_a_stall_and_too_long_is_a_timeout():
     assert status == STALLED
 
 
-@pytest.mark.parametrize("pull", ["screw", "apart"])
+@pytest.mark.parametrize("pull", ["screw", "decoupled"])
 def test_pulled_apart_the_tool_goes_straight_and_along_the_screw_otherwise(pull):
     arm = panda()
     start = arm.fk(READY)
     goal = start @ Pose.from_position_quaternion([0.06, 0.05, -0.05], [np.cos(0.4), 0.0, np.sin(0.4), 0.0])
     gentle = ControllerSettings(null_gain=0.0, max_linear=1e3, max_angular=1e3, gain=1.0)
-    pursuit = Pursuit(arm, PosePath(goal.dq[None]), DT, controller=gentle, settings=PursuitSettings(pull=pull))
+    pursuit = Pursuit(arm, PosePath(goal.dq[None]), DT, controller=gentle, settings=PursuitSettings(interpolation=pull))
     result = pursuit.roll_out(READY)
     assert result.arrived
     way = np.array([arm.fk(q).position for q in result.trace])
@@ -173,23 +173,23 @@ def test_pulled_apart_the_tool_goes_straight_and_along_the_screw_otherwise(pull)
     off_line = np.linalg.norm(np.cross(way - start.position, along), axis=1).max()
     curve = screw_path(start, goal, 0.0005).positions
     off_screw = max(np.linalg.norm(curve - each, axis=1).min() for each in way)
-    assert (off_line < 1e-3) == (pull == "apart")
+    assert (off_line < 1e-3) == (pull == "decoupled")
     assert (off_screw < 1e-3) == (pull == "screw")
 
 
 def test_the_papers_rule_advances_every_tick_and_is_late():
     arm, path = a_path(7, step=0.001)
-    settings_ = PursuitSettings(rule="paper", tau=0.01)
+    settings_ = PursuitSettings(advance="paper", tau=0.01)
     pursuit, q = Pursuit(arm, path, DT, settings=settings_), READY.copy()
     for k in range(len(path) - 1):
         _, qdot = pursuit.step(q)
         assert pursuit.index == k + 1
         q = q + DT * qdot
-    assert arm.fk(q).gap(path[-1])[0] > 0.5 * path.lengths()[-1] * 0.2
+    assert arm.fk(q).distance_to(path[-1])[0] > 0.5 * path.lengths()[-1] * 0.2
 
 
 @pytest.mark.parametrize(
-    "change", [{"tau": 0.0}, {"tau": 1.1}, {"rule": "fast"}, {"pull": "hard"}, {"capture_radius": -1.0}]
+    "change", [{"tau": 0.0}, {"tau": 1.1}, {"advance": "fast"}, {"interpolation": "hard"}, {"capture_radius": -1.0}]
 )
 def test_bad_settings_are_named(change):
     with pytest.raises(BadOption, match=next(iter(change))):

@@ -13,7 +13,7 @@ from helpers.solids import random_pose, random_shape, true_distance
 from helpers.strategies import assert_same_pose, for_all, random_dq, st
 
 from onedemo.planner.collision.clearance import find_near
-from onedemo.planner.collision.edge_certificates import is_clear, place_tool, point_speeds, slide_is_clear, tool_work
+from onedemo.planner.collision.edge_certificates import is_clear, place_tool, point_speeds, slide_is_clear, tool_arrays
 from onedemo.planner.collision.edge_certificates import screw_is_clear as screw_clear
 from onedemo.planner.collision.robot_arrays import W_REACH, WORLD
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, OneDemoError
@@ -52,7 +52,7 @@ def reach_of(tool: np.ndarray) -> float:
 
 def between(x: Pose, y: Pose, tool: np.ndarray) -> np.ndarray:
     """Poses on the screw from x to y so near to each other that no point of the tool moves farther than `FINE`."""
-    gap, angle = x.gap(y)
+    gap, angle = x.distance_to(y)
     # on the short screw the tcp's way is at most a quarter longer than (pi / 2 of) the straight line at half a turn
     count = math.ceil((0.5 * math.pi * gap + angle * reach_of(tool)) / FINE) + 1
     return dq.sclerp(x.dq, y.dq, np.linspace(0.0, 1.0, count + 1))
@@ -182,7 +182,7 @@ def test_what_is_far_away_changes_no_bit(seed):
 def test_the_bound_of_an_edge_is_no_less_than_the_way_of_any_point(seed):
     rng = np.random.default_rng(seed)
     tool, x, y = random_tool(rng), Pose(random_dq(rng)), Pose(random_dq(rng))
-    work = tool_work(tool, pack([]))
+    work = tool_arrays(tool, pack([]))
     fastest = point_speeds(work, screw.twist_of(screw.mul(screw.conj(tuple_of(x)), tuple_of(y))))
     bounds = work[WORLD : WORLD + len(tool), W_REACH]
     poses = [Pose(row) for row in dq.sclerp(x.dq, y.dq, np.linspace(0, 1, 400))]
@@ -215,7 +215,7 @@ def test_an_edge_is_called_clear_exactly_where_dense_samples_are(turned):
     for _ in range(60):
         tool, obstacle, x, y = some_edge(rng, turned)
         keep = rng.choice([0.0, 0.01, 0.03])
-        work = tool_work(tool, pack([obstacle]), margin=keep)
+        work = tool_arrays(tool, pack([obstacle]), margin=keep)
         clear = bool(is_clear(work, tuple_of(x), tuple_of(y), keep))
         assert clear == bool(screw_clear(work, tuple_of(x), tuple_of(y))) or not turned
         least = least_gap(PosePath(np.array([x.dq, y.dq])), tool, [obstacle], keep)
@@ -233,7 +233,7 @@ def test_many_edges_called_clear_are(turned):
     rng = np.random.default_rng(10 + turned)
     for _ in range(1500):
         tool, obstacle, x, y = some_edge(rng, turned)
-        work = tool_work(tool, pack([obstacle]), margin=0.01)
+        work = tool_arrays(tool, pack([obstacle]), margin=0.01)
         if is_clear(work, tuple_of(x), tuple_of(y), 0.01):
             assert least_gap(PosePath(np.array([x.dq, y.dq])), tool, [obstacle], 0.01) >= 0.01 - 1e-6
 
@@ -242,9 +242,9 @@ def test_a_slide_and_a_screw_without_a_turn_agree():
     rng = np.random.default_rng(5)
     for _ in range(200):
         tool, obstacle, x, y = some_edge(rng, False)
-        work = tool_work(tool, pack([obstacle]), margin=0.01)
+        work = tool_arrays(tool, pack([obstacle]), margin=0.01)
         place_tool(work, tuple_of(x), WORLD)
-        find_near(work, x.gap(y)[0] + 0.01)
+        find_near(work, x.distance_to(y)[0] + 0.01)
         slides = bool(slide_is_clear(work, tuple(y.position - x.position)))
         if slides != bool(screw_clear(work, tuple_of(x), tuple_of(y))):
             least = least_gap(PosePath(np.array([x.dq, y.dq])), tool, [obstacle], 0.01)
@@ -434,14 +434,14 @@ def test_a_long_bar_turns_to_pass_a_slot():
     assert escape.found
     assert least_gap(escape.path, bar, wall, DEFAULTS.distance) >= DEFAULTS.distance - 1e-6
     # skew is enough: a bar that goes along itself needs less of the slot than its shadow
-    assert max(pose.gap(Pose.identity())[1] for pose in escape.path) > DEFAULTS.turn - 1e-9
+    assert max(pose.distance_to(Pose.identity())[1] for pose in escape.path) > DEFAULTS.turn - 1e-9
 
 
 def test_a_turn_is_of_the_angle_that_is_set():
     path, tool, obstacles = tool_problem("cage", 0)
     tree = escape_path(path, tool, obstacles, RepetSettings(orientation="turn", turn=0.3, retries=0, nodes=200)).tree
     angles = np.array(
-        [Pose(tree.poses[tree.parents[k]]).gap(Pose(tree.poses[k]))[1] for k in range(1, len(tree.poses))]
+        [Pose(tree.poses[tree.parents[k]]).distance_to(Pose(tree.poses[k]))[1] for k in range(1, len(tree.poses))]
     )
     assert (angles > 0.1).any()
     np.testing.assert_allclose(angles[angles > 1e-6], 0.3, atol=1e-9)
@@ -454,7 +454,7 @@ def test_nodes_keep_the_roots_orientation_or_spread_the_turn():
     kept = escape_path(path, bar, ball)
     assert kept.found
     root = Pose(kept.tree.poses[0])
-    assert max(root.gap(Pose(row))[1] for row in kept.tree.poses) < 1e-12
+    assert max(root.distance_to(Pose(row))[1] for row in kept.tree.poses) < 1e-12
     spread = escape_path(path, bar, ball, RepetSettings(orientation="spread"))
     assert spread.found
     root = Pose(spread.tree.poses[0])
@@ -709,7 +709,7 @@ def test_first_blocked_is_the_first_edge_that_is_not_clear(kind):
     options[WIDEST] = DEFAULTS.distance
     for seed in range(3):
         path, tool, obstacles = tool_problem(kind, seed)
-        g = tool_work(tool, pack(obstacles), margin=DEFAULTS.distance)
+        g = tool_arrays(tool, pack(obstacles), margin=DEFAULTS.distance)
         clear = [is_clear(g, tuple(x), tuple(y), DEFAULTS.distance) for x, y in pairwise(path.dqs.tolist())]
         expected = clear.index(False) if False in clear else -1
         assert first_blocked(g, np.ascontiguousarray(path.dqs), len(path), 0, options) == expected
@@ -719,7 +719,7 @@ def test_children_far_off_the_plane_are_proven_clear_too():
     """A random child may go farther than its siblings: past a plate that no other can reach."""
     plate = Obstacle(Box((2.0, 2.0, 0.002)), Pose.from_position_quaternion([0.0, 0.0, 0.18]))
     ball = Obstacle(Sphere(0.05), Pose.from_position_quaternion([0.0, 0.0, -0.1]))
-    g, options = tool_work(point_tool(0.005), pack([plate, ball]), margin=0.01), DEFAULTS.packed()
+    g, options = tool_arrays(point_tool(0.005), pack([plate, ball]), margin=0.01), DEFAULTS.packed()
     options[WIDEST], options[RANDOM], options[AWAY] = 0.01, 40.0, 5.0
     tree, x = np.zeros((60, TREE_WIDTH)), tuple(Pose.identity().dq.tolist())
     tree[0, 0] = 1.0

@@ -221,7 +221,7 @@ def test_a_pure_translation_has_infinite_pitch_and_keeps_its_travel():
 
 @for_all(dqs(), dqs(), dqs())
 def test_the_pose_error_is_zero_for_equal_poses_only_and_blind_to_sign_and_world(c, x, h):
-    error, (distance, angle) = dq.pose_error(c, x), dq.gap(c, x)
+    error, (distance, angle) = dq.pose_error(c, x), dq.pose_distance(c, x)
     assert error == pytest.approx(np.hypot(2 * np.sin(angle / 4), distance / 2), abs=1e-12)
     assert distance == pytest.approx(np.linalg.norm(dq.translation(c) - dq.translation(x)), abs=1e-12)
     turn = Rotation.from_quat(c[[1, 2, 3, 0]]).inv() * Rotation.from_quat(x[[1, 2, 3, 0]])
@@ -238,7 +238,7 @@ def test_functions_broadcast_over_leading_axes():
     assert path.shape == dq.mul(a, b).shape == dq.power(path, tau).shape == dq.exp(dq.log(path)).shape == (4, 3, 8)
     assert dq.decoupled_lerp(a, b, tau).shape == dq.normalized(path).shape == dq.conj(path).shape == (4, 3, 8)
     assert dq.translation(path).shape == (4, 3, 3)
-    assert dq.pose_error(a, b).shape == dq.gap(a, b)[0].shape == dq.is_half_turn(path).shape == (4, 3)
+    assert dq.pose_error(a, b).shape == dq.pose_distance(a, b)[0].shape == dq.is_half_turn(path).shape == (4, 3)
     for i, j in np.ndindex(4, 3):
         np.testing.assert_array_equal(path[i, j], dq.sclerp(a[i, 0], b[j], tau[i, j]))
         np.testing.assert_array_equal(dq.mul(a, b)[i, j], dq.mul(a[i, 0], b[j]))

@@ -36,7 +36,7 @@ def test_composition_is_the_matrix_product(world_from_tcp, tcp_from_cup):
     np.testing.assert_allclose(world_from_cup.matrix, a.matrix @ b.matrix, rtol=0, atol=1e-12)
     np.testing.assert_allclose(a.inverse().matrix @ a.matrix, np.eye(4), rtol=0, atol=1e-12)
     assert_same_pose((world_from_cup.inverse() @ a).dq, b.inverse().dq, 1e-12)
-    distance, angle = a.gap(world_from_cup)
+    distance, angle = a.distance_to(world_from_cup)
     assert distance == pytest.approx(np.linalg.norm(b.position), abs=1e-12)
     assert 2 * np.cos(angle) + 1 == pytest.approx(np.trace(b.rotation), abs=1e-12)
 

@@ -132,7 +132,7 @@ def test_the_curve_approaches_the_path_it_was_sampled_from_also_with_uneven_step
         s = np.concatenate([[0.0], np.cumsum(np.resize([1.0, 3.0], count - 1))])
         s /= s[-1]
         inside = np.linspace(0.3, 0.7, 101)
-        off = dq.gap(smooth(PosePath(path(s)), knots=s).poses(inside), path(inside))
+        off = dq.pose_distance(smooth(PosePath(path(s)), knots=s).poses(inside), path(inside))
         errors.append(np.hypot(off[0], LEVER * off[1]).max())
     assert errors[0] < 2e-3 and errors[0] / errors[1] > 6 and errors[1] / errors[2] > 6
 
@@ -140,7 +140,7 @@ def test_the_curve_approaches_the_path_it_was_sampled_from_also_with_uneven_step
 def test_wide_steps_through_the_half_turn_do_not_jump():
     turns = [Pose.from_yaw([0.1 * k, 0, 0], 2.6 * k) for k in range(6)]
     dense = smooth_path(PosePath(np.array([pose.dq for pose in turns])), per_segment=40)
-    assert dq.gap(dense.dqs[:-1], dense.dqs[1:])[1].max() < 0.1
+    assert dq.pose_distance(dense.dqs[:-1], dense.dqs[1:])[1].max() < 0.1
 
 
 def test_repeats_are_dropped_by_length_and_refused_as_knots():
@@ -189,7 +189,7 @@ def off_the_screws(path: PosePath, rows: np.ndarray) -> float:
     lengths, worst = path.lengths(LEVER), 0.0
     for i, j in pairwise(rows):
         part = (lengths[i : j + 1] - lengths[i]) / (lengths[j] - lengths[i])
-        distance, angle = dq.gap(path.dqs[i : j + 1], dq.sclerp(path.dqs[i], path.dqs[j], part))
+        distance, angle = dq.pose_distance(path.dqs[i : j + 1], dq.sclerp(path.dqs[i], path.dqs[j], part))
         worst = max(worst, float(np.hypot(distance, LEVER * angle).max()))
     return worst
 

@@ -148,7 +148,7 @@ def test_small_relative_steps_are_small_steps_of_both_arms_through_the_half_turn
     assert_same_pose(relative_path(left, right).dqs, rho.dqs, 1e-12)
     for path in (left, right):
         assert (steps(path) <= 6.0 * steps(rho)).all()
-        turned, shown = (dq.gap(p.dqs[:-1], p.dqs[1:])[1] for p in (path, rho))
+        turned, shown = (dq.pose_distance(p.dqs[:-1], p.dqs[1:])[1] for p in (path, rho))
         assert (turned <= shown / np.sin(0.25)).all()
 
 
@@ -158,7 +158,7 @@ def test_each_arm_does_its_part_of_a_long_turn(beta):
     with pytest.warns(HalfTurnPassed):
         paths = split(rho, Pose.identity(), beta)
     for path, part in zip(paths, (beta, 1.0 - beta), strict=True):
-        turned = dq.gap(path.dqs[:-1], path.dqs[1:])[1].sum()
+        turned = dq.pose_distance(path.dqs[:-1], path.dqs[1:])[1].sum()
         assert turned == pytest.approx(part * 5.3, abs=1e-9)
 
 
@@ -207,7 +207,7 @@ def test_shared_translation_turns_one_hand_only_and_keeps_the_relative_path(seed
     left, right = shared_translation(rho, absolute, share)
     assert_same_pose(relative_path(left, right).dqs, rho.dqs, 1e-12)
     assert_same_pose(left.dqs[-1], absolute.dq, 1e-12)
-    np.testing.assert_allclose(dq.gap(left.dqs, absolute.dq)[1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(dq.pose_distance(left.dqs, absolute.dq)[1], 0.0, atol=1e-12)
     apart = (rho.positions - rho.positions[-1]) @ absolute.rotation.T
     np.testing.assert_allclose(left.positions - left.positions[-1], -share * apart, rtol=0, atol=1e-12)
     np.testing.assert_allclose(right.positions - right.positions[-1], (1 - share) * apart, rtol=0, atol=1e-12)

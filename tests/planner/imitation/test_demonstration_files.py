@@ -269,7 +269,7 @@ def test_saving_and_loading_keeps_everything(tmp_path):
             theirs.held,
             theirs.gripper,
         )
-        assert ours.reference_pose.gap(theirs.reference_pose) < (1e-12, 1e-12)
+        assert ours.reference_pose.distance_to(theirs.reference_pose) < (1e-12, 1e-12)
     np.testing.assert_array_equal(again.object_sizes["cubeA"], [0.04] * 3)
 
 

@@ -93,7 +93,7 @@ def test_bad_teleoperations_are_named_with_file_and_index(key, change, message, 
 def test_the_recorded_joints_give_the_recorded_path():
     demo, arm = load_demonstration(shipped_demonstration("stack")), robot_arm("Panda")
     for k in range(0, len(demo.path), 25):
-        distance, angle = arm.fk(demo.joint_positions[k]).gap(demo.path[k])
+        distance, angle = arm.fk(demo.joint_positions[k]).distance_to(demo.path[k])
         assert distance < 1e-9
         assert angle < 1e-9
 

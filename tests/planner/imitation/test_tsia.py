@@ -251,4 +251,4 @@ def test_two_sided_imitation_does_not_jump_when_the_goal_is_turned_half_around(s
     shown = PosePath(np.array([Pose.from_position_quaternion(*pose).dq for pose in poses]))
     goal = Pose.from_yaw([0.3, 0.2, 0], np.pi - short_of_half_turn) @ shown[-1]
     path = two_sided_path(shown, shown[0], goal)
-    assert np.max(dq.gap(path.dqs[:-1], path.dqs[1:])[1]) < 0.3
+    assert np.max(dq.pose_distance(path.dqs[:-1], path.dqs[1:])[1]) < 0.3

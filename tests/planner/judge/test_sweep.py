@@ -12,7 +12,7 @@ from onedemo.planner.errors import BadOption
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
 from onedemo.planner.judge.deviation import deviation_of, frechet
-from onedemo.planner.judge.geometry import Kinematics, Scene
+from onedemo.planner.judge.geometry import CollisionWorld, Kinematics
 from onedemo.planner.judge.sweep import Sweeper, SweepSettings, travel
 from onedemo.planner.log.motion_log import MotionLog
 from onedemo.planner.robot.arm import Arm
@@ -74,7 +74,7 @@ def still_capsules(rng: np.random.Generator, count: int) -> Body:
 
 def distances(body: Body, obstacle: Obstacle) -> tuple[np.ndarray, np.ndarray]:
     """Of all capsules to one obstacle, and the coarse lower bounds."""
-    scene = Scene(body, [obstacle])
+    scene = CollisionWorld(body, [obstacle])
     moment = Kinematics(panda(), body).moment(np.zeros(1), np.zeros((1, 7)))
     cells = np.array([(0, k, 0) for k in range(len(body))])
     return scene.distances(moment, cells), scene.at_least(moment)[0, :, 0]
@@ -212,7 +212,7 @@ def test_the_certified_clearance_lies_just_below_that_of_dense_sampling(seed):
     required = np.full((len(log.body), 3), log.safety)
     settings = SweepSettings(slack=1e-3)
     sweep = Sweeper(log, required, -np.inf, settings).run()
-    scene, kinematics = Scene(log.body, log.obstacles), Kinematics(log.arm, log.body)
+    scene, kinematics = CollisionWorld(log.body, log.obstacles), Kinematics(log.arm, log.body)
     time = np.linspace(log.time[0], log.time[-1], 400)
     qs = np.column_stack([np.interp(time, log.time, q) for q in log.joints.T])
     cells = np.array(list(np.ndindex(len(time), *required.shape)))

@@ -31,11 +31,11 @@ from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Capsule, Obstacle, Sphere
 from onedemo.planner.imitation.tsia import guide_index, screw_path
 from onedemo.planner.judge.certify import ANGLE_ERROR, POSITION_ERROR, certify
-from onedemo.planner.planning.joint_space_motion import RAMP, After, strayed, timed_on_lines
+from onedemo.planner.planning.joint_space_motion import RAMP, NextMotionCheck, path_deviation, timed_on_lines
 from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
-from onedemo.planner.planning.plan import Onward, Plan, Problem
+from onedemo.planner.planning.plan import NextMotion, Plan, Problem
 from onedemo.planner.planning.planner import Planner, plan, plan_batch
-from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.settings import JointSearchSettings, PlanSettings
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body
@@ -110,7 +110,7 @@ def test_a_start_that_is_clear_is_not_called_a_collision():
     arm, body, _ = panda()
     for seed in range(150):
         scene = problem("cage", seed)
-        room = SceneWork.of(arm, body, scene.obstacles, SETTINGS).room(scene.start)
+        room = PlanningScene.of(arm, body, scene.obstacles, SETTINGS).slack(scene.start)
         assert room >= 0.0 and solve(scene).reason != "start in collision", seed
 
 
@@ -160,7 +160,7 @@ def test_limits_and_speeds_are_kept_and_told(kind):
             assert found.margin == pytest.approx(margins.min(), abs=1e-12)
             speeds = np.abs(np.diff(found.joints, axis=0)) / found.dt
             assert (speeds <= arm.velocity_limits * (1 + 1e-9)).all()
-            gap, angle = arm.fk(found.joints[-1]).gap(problem(kind, seed).goal)
+            gap, angle = arm.fk(found.joints[-1]).distance_to(problem(kind, seed).goal)
             assert gap < POSITION_ERROR and angle < ANGLE_ERROR
 
 
@@ -273,13 +273,13 @@ def test_a_posture_from_which_the_next_leg_goes_on_is_preferred():
             continue
         lifted = screw_path(scene.goal, at([0.0, 0.0, 0.12]) @ scene.goal, 0.01)
         looked = planner.plan(
-            demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=Onward(lifted)
+            demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, next_motion=NextMotion(lifted)
         )
         assert_sound(looked, arm, body, scene.start, scene.goal, scene.obstacles)
-        onward = [
+        next_motion = [
             planner.plan(lifted, leg.joints[-1], lifted[-1], scene.obstacles).how == "direct" for leg in (found, looked)
         ]
-        tried, better = tried + 1, better + onward[1] - onward[0]
+        tried, better = tried + 1, better + next_motion[1] - next_motion[0]
         if tried == 3:
             break
     assert tried == 3 and better >= 0
@@ -351,7 +351,7 @@ def test_what_is_too_close_for_a_detour_is_named():
     goal = at([0.0, 0.4, 1.0], free_leg()[1].quaternion)
     wall = Obstacle(Box((2.0, 0.02, 3.0)), at([0.65, 0.2, 1.0]), name="wall")
     shelf = Obstacle(Box((0.2, 0.2, 0.02)), at(goal.position - [0.0, 0.0, 0.3]), name="shelf")
-    gap = SceneWork.of(arm, body, [shelf], SETTINGS).tool_room(goal) + SETTINGS.safety.distance
+    gap = PlanningScene.of(arm, body, [shelf], SETTINGS).tool_slack(goal) + SETTINGS.safety.distance
     near = Obstacle(shelf.shape, at([0.0, 0.0, gap - 0.015]) @ shelf.pose, name="shelf")
     planner = Planner(arm, body, PlanSettings(search=None))
     failed = planner.plan(demonstrated(), home, goal, [wall, near])
@@ -404,14 +404,14 @@ def test_fallbacks_are_kept_only_where_nothing_better_is_found():
             if not one.success:
                 continue
             assert two.success and judged(scene, two).ok
-            assert two.kept >= suffix_share(two) - 1e-9
-            good = one.kept >= SETTINGS.keep and one.end_margin >= SETTINGS.end_margin
+            assert two.imitated_share >= suffix_share(two) - 1e-9
+            good = one.imitated_share >= SETTINGS.min_imitated_share and one.end_margin >= SETTINGS.end_margin
             if good:
                 assert same_plan(one, two), "what is good at the first try is taken"
                 continue
             tried += 1
-            assert (round(two.kept, 1), two.end_margin) >= (round(one.kept, 1), one.end_margin)
-            better += two.kept > one.kept + 0.05 or two.end_margin > one.end_margin + 0.05
+            assert (round(two.imitated_share, 1), two.end_margin) >= (round(one.imitated_share, 1), one.end_margin)
+            better += two.imitated_share > one.imitated_share + 0.05 or two.end_margin > one.end_margin + 0.05
             assert two.tries <= one.tries + SETTINGS.effort
     assert tried >= 10 and better >= 0.5 * tried
 
@@ -517,15 +517,15 @@ def test_arms_of_any_build_are_planned_for(dof):
         body, rng = simple_body(arm), np.random.default_rng(seed)
         start = rng.uniform(-1.0, 1.0, dof)
         end = start + rng.uniform(-0.5, 0.5, dof)
-        alone = SceneWork.of(arm, body, (), SETTINGS)
-        if min(alone.room(start), alone.room(end)) < 0.0:
+        alone = PlanningScene.of(arm, body, (), SETTINGS)
+        if min(alone.slack(start), alone.slack(end)) < 0.0:
             continue  # folded onto itself
         here, goal = arm.fk(start), arm.fk(end)
         path = screw_path(here, goal, 0.01)
         middle = path[len(path) // 2].position
         away = Obstacle(Box((0.05, 0.05, 0.05)), at([0.0, 0.0, 0.02]) @ at(middle))
-        scene = SceneWork.of(arm, body, [away], SETTINGS)
-        clear = min(scene.room(start), scene.room(end), scene.tool_room(goal)) > 0.01
+        scene = PlanningScene.of(arm, body, [away], SETTINGS)
+        clear = min(scene.slack(start), scene.slack(end), scene.tool_slack(goal)) > 0.01
         obstacles, tried = [away] * clear, tried + 1
         found = Planner(arm, body).plan(path, start, goal, obstacles, seed=seed)
         if found.success:
@@ -594,7 +594,7 @@ def test_a_way_in_time_stays_on_its_lines_and_keeps_the_speeds_from_rest_to_rest
 def test_shortened_ways_keep_their_ends_get_no_longer_and_stay_clear(seed):
     scene = problem("gap", seed)
     arm, body, _ = panda()
-    robot = SceneWork.of(arm, body, scene.obstacles, SETTINGS).robot
+    robot = PlanningScene.of(arm, body, scene.obstacles, SETTINGS).robot
     rng, found = np.random.default_rng(seed), 0
     for _ in range(40):
         points = np.clip(scene.start + np.cumsum(rng.normal(0.0, 0.12, (6, 7)), axis=0), arm.lower, arm.upper)
@@ -616,11 +616,11 @@ def test_how_far_a_tool_strays_is_its_distance_from_the_edges_of_its_path():
     arm, _, home = panda()
     start = arm.fk(home)
     path = screw_path(start, at([0.0, 0.1, 0.0]) @ start, 0.01)
-    assert strayed(arm, home[None], path.dqs) < 1e-12
-    assert strayed(arm, home[None], path[3:].dqs) == pytest.approx(path[3].gap(start)[0], abs=1e-9)
+    assert path_deviation(arm, home[None], path.dqs) < 1e-12
+    assert path_deviation(arm, home[None], path[3:].dqs) == pytest.approx(path[3].distance_to(start)[0], abs=1e-9)
     lifted = screw_path(at([0.0, -0.005, 0.02]) @ start, at([0.0, 0.1, 0.02]) @ start, 0.01)
-    assert strayed(arm, home[None], lifted.dqs) == pytest.approx(0.02, abs=1e-9)
-    assert strayed(arm, home[None], start.dq[None]) < 1e-12
+    assert path_deviation(arm, home[None], lifted.dqs) == pytest.approx(0.02, abs=1e-9)
+    assert path_deviation(arm, home[None], start.dq[None]) < 1e-12
 
 
 def test_a_leg_that_must_go_on_ends_where_it_can():
@@ -634,15 +634,17 @@ def test_a_leg_that_must_go_on_ends_where_it_can():
             continue
         lifted = screw_path(scene.goal, at([0.0, 0.0, 0.04]) @ scene.goal, 0.01)
         planner = Planner(arm, body, SETTINGS)
-        after = After(plain.asked.scene, lifted, must=True)
-        if after.can_be_done(arm, planner._work, plain.joints[-1], SETTINGS):
+        after = NextMotionCheck(plain.request.scene, lifted, must=True)
+        if after.is_feasible(arm, planner._work, plain.joints[-1], SETTINGS):
             continue
         tried += 1
-        onward = Onward(lifted, must=True)
-        found = planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, onward=onward)
+        next_motion = NextMotion(lifted, must=True)
+        found = planner.plan(
+            demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, next_motion=next_motion
+        )
         assert_sound(found, arm, body, scene.start, scene.goal, scene.obstacles)
-        assert found.goes_on == after.can_be_done(arm, planner._work, found.joints[-1], SETTINGS)
-        rescued += found.goes_on
+        assert found.next_feasible == after.is_feasible(arm, planner._work, found.joints[-1], SETTINGS)
+        rescued += found.next_feasible
         if tried == 12 or rescued:
             break
     assert tried and rescued

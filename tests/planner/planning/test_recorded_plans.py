@@ -22,7 +22,7 @@ from onedemo.planner.imitation.import_recordings import from_pose_table, stack_f
 from onedemo.planner.imitation.segmentation import resampled, trimmed
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.planner import Planner
-from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.robot.arm import Arm
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
@@ -71,8 +71,8 @@ def leg(name: str, seed: int):
         for _ in range(rng.integers(3)):
             between = path[0].position + rng.uniform(0.3, 0.7) * (goal.position - path[0].position)
             obstacles.append(Obstacle(any_shape(rng, 0.15), anyhow(rng, between + rng.normal(size=3) * 0.08)))
-        scene = SceneWork.of(arm, body, obstacles, SETTINGS)
-        if scene.room(start) < 0.015 or scene.tool_room(goal) < 0.005 or base_gap(body, obstacles) < 0.01:
+        scene = PlanningScene.of(arm, body, obstacles, SETTINGS)
+        if scene.slack(start) < 0.015 or scene.tool_slack(goal) < 0.005 or base_gap(body, obstacles) < 0.01:
             continue
         if clear_posture(arm, scene, goal, start, rng) is not None:
             return start, goal, tuple(obstacles)

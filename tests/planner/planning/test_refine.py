@@ -7,7 +7,7 @@ import pytest
 
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
-from onedemo.planner.collision.edge_certificates import tool_work
+from onedemo.planner.collision.edge_certificates import tool_arrays
 from onedemo.planner.errors import PlanFailed
 from onedemo.planner.escape.repet import clear_of, escape_path, point_tool
 from onedemo.planner.geometry.pose import Pose
@@ -41,7 +41,7 @@ def judged(plan, arm, body, obstacles):
     time = plan.dt * np.arange(len(plan.joints))
     log = MotionLog(
         arm=arm, body=body, obstacles=tuple(obstacles), time=time, joints=plan.joints, safety=0.01,
-        goal=plan.asked.goal, claims={"joint_margin": plan.margin},
+        goal=plan.request.goal, claims={"joint_margin": plan.margin},
     )  # fmt: skip
     return certify(log)
 
@@ -78,7 +78,7 @@ def test_a_smooth_plan_bends_less_and_is_clear(things):
     assert smooth.success and smooth.refined == ("smooth",)
     assert judged(smooth, arm, body, ball).ok
     np.testing.assert_array_equal(smooth.joints[0], plan.joints[0])
-    assert smooth.path[-1].gap(plan.asked.goal)[0] < 1e-12
+    assert smooth.path[-1].distance_to(plan.request.goal)[0] < 1e-12
     if things:
         assert bends(smooth.path.positions).max() < 0.5 * bends(plan.path.positions).max()
     both = smooth.timed()
@@ -88,13 +88,13 @@ def test_a_smooth_plan_bends_less_and_is_clear(things):
 def test_what_the_spline_or_the_curve_runs_into_is_refused():
     arm, _, plan = planned([])
     wall = (Obstacle(Box((1.0, 0.01, 1.0)), Pose.from_position_quaternion(between(arm, 0.9)), name="wall"),)
-    walled = plan._replace(asked=plan.asked._replace(obstacles=wall))
+    walled = plan._replace(asked=plan.request._replace(obstacles=wall))
     with pytest.raises(PlanFailed, match=r"not clear at \d"):
         walled.timed()
     with pytest.raises(PlanFailed, match="not clear behind pose"):
         walled.smoothed()
     with pytest.raises(PlanFailed, match=r"not clear at \d"):
-        retimed(plan.joints, plan.dt, 5.0, arm, walled.asked.scene)
+        retimed(plan.joints, plan.dt, 5.0, arm, walled.request.scene)
     refused = plan.refused(PlanFailed("plan_failed", "so"))
     assert not refused.success and refused.why == "plan_failed: so" and len(refused.joints) == 1
 
@@ -124,10 +124,10 @@ def test_a_detour_is_made_smooth_and_stays_clear():
     ball, tool = [Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.4, 0.0, 0.0]))], point_tool(0.03)
     escape = escape_path(screw_path(start, end, 0.01), tool, ball)
     assert escape.found and escape.detours
-    curve = smooth_clear_path(escape.path, tool_work(tool, pack(ball), margin=0.015), 0.015)
+    curve = smooth_clear_path(escape.path, tool_arrays(tool, pack(ball), margin=0.015), 0.015)
     assert min(clear_of(pose, tool, ball) for pose in curve) >= 0.015
     for k in (0, -1):
-        distance, angle = curve[k].gap(escape.path[k])
+        distance, angle = curve[k].distance_to(escape.path[k])
         assert distance < 1e-12 and angle < 1e-9
     assert bends(curve.positions).max() < 0.7 * bends(escape.path.positions).max()
 
@@ -136,4 +136,4 @@ def test_a_curve_that_is_not_clear_is_refused():
     path = screw_path(Pose.identity(), Pose.from_position_quaternion([0.8, 0.0, 0.0]), 0.01)
     with pytest.raises(PlanFailed, match="behind pose"):
         ball = [Obstacle(Sphere(0.1), Pose.from_yaw([0.4, 0.0, 0.0], 0.0))]
-        smooth_clear_path(path, tool_work(point_tool(0.03), pack(ball), margin=0.01), 0.01)
+        smooth_clear_path(path, tool_arrays(point_tool(0.03), pack(ball), margin=0.01), 0.01)

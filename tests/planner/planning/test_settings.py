@@ -22,7 +22,7 @@ def test_a_joint_solution_reaches_the_pose(seed):
     target = arm.fk(READY + rng.uniform(-0.3, 0.3, 7))
     q = inverse_kinematics(arm, target, READY)
     assert q is not None
-    distance, angle = arm.fk(q).gap(target)
+    distance, angle = arm.fk(q).distance_to(target)
     assert distance < POSITION_TOLERANCE
     assert angle < ANGLE_TOLERANCE
     assert arm.margin(q) >= 0

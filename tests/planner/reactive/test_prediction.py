@@ -10,18 +10,18 @@ from helpers.random_scenes import at, base_gap
 
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
-from onedemo.planner.collision.clearance import room_at
-from onedemo.planner.control.arm_arrays import bound
+from onedemo.planner.collision.clearance import slack_at
+from onedemo.planner.control.arm_arrays import arm_arrays
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere, moves
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.log.motion_log import MotionLog
-from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.settings import PlanSettings
 from onedemo.planner.reactive.command import DONE, ESCAPING, FAILED, WAITING, ReactiveSettings
-from onedemo.planner.reactive.prediction import Foresight, same_scene, swept, windows
-from onedemo.planner.reactive.reactive_planner import ReactivePlanner, fresh_memory
+from onedemo.planner.reactive.prediction import Predictor, same_scene, swept, windows
+from onedemo.planner.reactive.reactive_planner import ReactivePlanner, fresh_pursuit_state
 from onedemo.planner.safety.safety_layer import safe_velocity
 
 DT = 0.02
@@ -54,7 +54,7 @@ def crossing(seed: int, speed: float) -> Obstacle:
         line = np.array([thing.at(t).pose.position for t in np.linspace(0.0, 12.0, 200)])
         if np.hypot(line[:, 0] + 0.56, line[:, 1]).min() < SHOULDER or base_gap(body, [thing]) < SHOULDER:
             continue
-        if room_at(SceneWork.of(arm, body, [thing], PlanSettings()).robot, START, 0.0, 1.0) > 0.03:
+        if slack_at(PlanningScene.of(arm, body, [thing], PlanSettings()).robot, START, 0.0, 1.0) > 0.03:
             return thing
 
 
@@ -82,7 +82,7 @@ def judged_clearance(trace, obstacle) -> float:
 
 
 def arrives(trace) -> bool:
-    distance, angle = robot()[0].fk(trace[-1]).gap(leg()[-1])
+    distance, angle = robot()[0].fk(trace[-1]).distance_to(leg()[-1])
     return distance < 2e-3 and angle < 0.02
 
 
@@ -122,7 +122,7 @@ def appearing(count: int, speed: float, first: int) -> list[Obstacle]:
     free, out, seed = followed(lambda k: ())[1], [], 1000
     while len(out) < count:
         thing, seed = crossing(seed, speed), seed + 1
-        if SceneWork.of(*robot(), [thing.at(DT * first)], PlanSettings()).room(free[first]) > 0.03:
+        if PlanningScene.of(*robot(), [thing.at(DT * first)], PlanSettings()).slack(free[first]) > 0.03:
             out.append(thing)
     return out
 
@@ -174,8 +174,8 @@ def test_waiting_is_standing_still_because_of_what_moves():
         if command.state == WAITING:
             seen += 1
             # it stands, or gives way
-            assert np.abs(command.velocity).max() < 0.15 or command.room < 0.05
-            assert np.isfinite(SceneWork.of(arm, body, [bar], PlanSettings()).room(q))
+            assert np.abs(command.velocity).max() < 0.15 or command.slack < 0.05
+            assert np.isfinite(PlanningScene.of(arm, body, [bar], PlanSettings()).slack(q))
     assert seen > 0 and commands[-1].state == DONE
 
 
@@ -189,20 +189,20 @@ def test_what_is_foreseen_comes_true():
     settings = ReactiveSettings(horizon=0.0, lead=0.0, patience=30.0)
     commands, _ = followed(lambda k: (thing.at(DT * k),), settings)
     motion = settings.plan.motion
-    work = bound(arm, motion.controller.packed(), replace(motion.pursuit, patience=1e9).packed())
-    scene = SceneWork.of(arm, body, [thing], settings.plan)
+    work = arm_arrays(arm, motion.controller.packed(), replace(motion.pursuit, patience=1e9).packed())
+    scene = PlanningScene.of(arm, body, [thing], settings.plan)
     safe_velocity(scene.robot, START, np.zeros(7), DT, np.empty(7))
-    before, memory = scene.robot.copy(), fresh_memory()
-    ahead = Foresight(work, DT, 30.0, 0.15).ahead(scene.robot, leg(), memory, START)
+    before, memory = scene.robot.copy(), fresh_pursuit_state()
+    ahead = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, leg(), memory, START)
     assert ahead.arrival == pytest.approx(DT * (len(commands) - 1), abs=1e-9)
-    rooms = [command.room for command in commands]
-    assert ahead.room == pytest.approx(min(rooms), abs=1e-6)
+    rooms = [command.slack for command in commands]
+    assert ahead.slack == pytest.approx(min(rooms), abs=1e-6)
     # looking changes nothing
     np.testing.assert_array_equal(scene.robot, before)
-    np.testing.assert_array_equal(memory, fresh_memory())
-    short = Foresight(work, DT, 0.5, 0.15).ahead(scene.robot, leg(), memory, START)
+    np.testing.assert_array_equal(memory, fresh_pursuit_state())
+    short = Predictor(work, DT, 0.5, 0.15).ahead(scene.robot, leg(), memory, START)
     assert 0.5 < short.arrival < ahead.arrival + 1.0
-    later = Foresight(work, DT, 30.0, 0.15).ahead(scene.robot, leg(), memory, START, wait=5.0)
+    later = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, leg(), memory, START, wait=5.0)
     assert later.arrival > 5.0
 
 

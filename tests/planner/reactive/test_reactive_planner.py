@@ -9,13 +9,13 @@ import pytest
 
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
-from onedemo.planner.collision.clearance import room_at
+from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.errors import BadOption
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere
 from onedemo.planner.imitation.tsia import screw_path
-from onedemo.planner.planning.joint_space_motion import STRAY, strayed
-from onedemo.planner.planning.planning_scene import SceneWork
+from onedemo.planner.planning.joint_space_motion import MAX_DEVIATION, path_deviation
+from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.reactive.command import (
     BLOCKED,
     DONE,
@@ -51,11 +51,11 @@ def ball(place, *, radius=0.04, velocity=(0.0, 0.0, 0.0)):
     return Obstacle(Sphere(radius), Pose.from_position_quaternion(place), np.array(velocity), "ball")
 
 
-def followed(path, world, *, settings=None, ticks=1500, strictly=False):
+def followed(path, world, *, settings=None, ticks=1500, detours=True):
     """States, joints and rooms of following a path in a world that is a function of the tick."""
     arm, body = robot()
     planner = ReactivePlanner(arm, body, settings)
-    planner.go(path, strictly=strictly)
+    planner.go(path, detours=detours)
     q, states, rooms, trace = START.copy(), [], [], []
     for k in range(ticks):
         obstacles = world(k)
@@ -64,7 +64,7 @@ def followed(path, world, *, settings=None, ticks=1500, strictly=False):
         assert command.state in STATES and np.isfinite(command.velocity).all()
         q = q + DT * command.velocity
         later = [obstacle.at(DT) for obstacle in obstacles]
-        rooms.append(room_at(SceneWork.of(arm, body, later, planner.settings.plan).robot, q, 0.0, 1.0))
+        rooms.append(slack_at(PlanningScene.of(arm, body, later, planner.settings.plan).robot, q, 0.0, 1.0))
         states.append(command.state)
         trace.append(q)
         if command.state in (DONE, FAILED):
@@ -73,7 +73,7 @@ def followed(path, world, *, settings=None, ticks=1500, strictly=False):
 
 
 def reached(path, q):
-    distance, angle = robot()[0].fk(q).gap(path[-1])
+    distance, angle = robot()[0].fk(q).distance_to(path[-1])
     return distance < 2e-3 and angle < 0.02
 
 
@@ -172,7 +172,7 @@ def test_standing_still_gives_way_to_what_comes():
         command = planner.step(q)
         q = q + DT * command.velocity
         later = ball(start + DT * (k + 1) * velocity)
-        least = min(least, room_at(SceneWork.of(arm, body, [later], planner.settings.plan).robot, q, 0.0, 1.0))
+        least = min(least, slack_at(PlanningScene.of(arm, body, [later], planner.settings.plan).robot, q, 0.0, 1.0))
     assert least > -5e-3
     assert np.abs(q - START).max() > 0.05
 
@@ -184,19 +184,19 @@ def test_the_same_world_gives_the_same_motion():
     np.testing.assert_array_equal(one, two)
 
 
-def test_loosely_is_less_than_exactly():
+def test_within_reach_of_the_end_is_less_than_exactly():
     arm, body = robot()
     path, ends = sideways(0.1), []
-    for loosely in (False, True):
+    for exact in (True, False):
         planner = ReactivePlanner(arm, body)
-        planner.go(path, loosely=loosely)
+        planner.go(path, exact=exact)
         q = START.copy()
         for _ in range(500):
             command = planner.step(q)
             if command.state == DONE:
                 break
             q = q + DT * command.velocity
-        ends.append(arm.fk(q).gap(path[-1])[0])
+        ends.append(arm.fk(q).distance_to(path[-1])[0])
     assert ends[0] < 1.1e-3 < ends[1] < 0.011
 
 
@@ -211,25 +211,25 @@ def test_absurd_settings_are_refused(change):
 BESIDE = np.array([0.0, 0.0, 0.13])
 
 
-def test_strictly_nothing_is_led_round_and_the_tool_stays_on_its_path():
+def test_without_detours_nothing_is_led_round_and_the_tool_stays_on_its_path():
     """Beside the path the safety layer would push the tool away from it; that is waited out, then given up."""
     path = sideways()
     beside = middle(path) + BESIDE
     things = (ball(beside),)
     arm, _ = robot()
     free_states, _, free, _ = followed(path, lambda k: things)
-    assert free_states[-1] == DONE and strayed(arm, free, path.dqs) > 3 * STRAY
-    states, rooms, trace, planner = followed(path, lambda k: things, strictly=True)
+    assert free_states[-1] == DONE and path_deviation(arm, free, path.dqs) > 3 * MAX_DEVIATION
+    states, rooms, trace, planner = followed(path, lambda k: things, detours=False)
     assert states[-1] == FAILED and planner.reason == "blocked" and "ball" in planner.detail
     assert ESCAPING not in states and rooms.min() >= -1e-9
     # a tick past the limit is what it takes to see that it is passed
-    assert strayed(arm, trace, path.dqs) < STRAY + 0.001
+    assert path_deviation(arm, trace, path.dqs) < MAX_DEVIATION + 0.001
 
 
-def test_strictly_it_goes_on_when_what_was_beside_is_gone():
+def test_without_detours_it_goes_on_when_what_was_beside_is_gone():
     path = sideways()
     things = (ball(middle(path) + BESIDE),)
-    states, _, trace, _ = followed(path, lambda k: things if k < 120 else (), strictly=True)
+    states, _, trace, _ = followed(path, lambda k: things if k < 120 else (), detours=False)
     assert WAITING in states and states[-1] == DONE and reached(path, trace[-1])
 
 

@@ -131,7 +131,7 @@ def test_another_tool_is_the_same_arm_seen_from_elsewhere(seed, dof):
     rng = np.random.default_rng(seed)
     arm, tool = random_arm(seed, dof), Pose(random_dq(rng))
     q, other = joints(arm, rng), arm.with_tool(tool)
-    distance, angle = other.fk(q).gap(arm.fk(q) @ tool)
+    distance, angle = other.fk(q).distance_to(arm.fk(q) @ tool)
     assert distance < 1e-12 and angle < 1e-7
     h, direction = 1e-6, rng.normal(size=dof)
     step = other.fk(q - h * direction).inverse() @ other.fk(q + h * direction)

@@ -32,7 +32,7 @@ from soak import (
 )
 
 from onedemo.planner import jit
-from onedemo.planner.collision.clearance import room_at
+from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.errors import BadOption, BadShape, UnknownName
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
@@ -94,7 +94,7 @@ def test_the_panda_is_left_alone_in_free_space_within_its_speeds():
     for _ in range(50):
         u = rng.uniform(-1, 1, 7) * arm.velocity_limits
         result = layer(READY, u)
-        assert (result.status, result.velocity.tobytes(), result.room) == (FREE, u.tobytes(), math.inf)
+        assert (result.status, result.velocity.tobytes(), result.slack) == (FREE, u.tobytes(), math.inf)
 
 
 def test_too_fast_a_command_is_scaled_as_a_whole():
@@ -119,7 +119,7 @@ def test_one_bound_is_kept_by_the_closed_form(seed, kind):
     rows = layer.work[int(layer.work[0, 7]) :]
     gap, n, setting = rows[0, 3], rows[0, 5:8].copy(), layer.settings
     result = layer(q, u)
-    if result.status in (FREE, CHANGED) and result.room > 0 and gap > 1e-6:
+    if result.status in (FREE, CHANGED) and result.slack > 0 and gap > 1e-6:
         short = max(0.0, -setting.alpha * (gap - 0.01 - setting.buffer) + n @ obstacle.velocity - n @ u)
         # the bound is soft: it gives way by a ten-millionth
         np.testing.assert_allclose(result.velocity, u + short * n, rtol=0, atol=1e-9 + 3e-7 * short)
@@ -136,7 +136,7 @@ def test_the_room_shrinks_at_most_by_its_share_per_step(seed, alpha):
     # a decay of 1 and a step that always is clear: the guard does not help
     layer = point_among(obstacles, settings=SafetySettings(alpha=alpha, decay=1.0, shell=0.3))
     q, gamma = rng.normal(size=3), min(1.0, alpha * DT)
-    room, seen = room_at(layer.work, q, 0.0, 10.0), 0
+    room, seen = slack_at(layer.work, q, 0.0, 10.0), 0
     for _ in range(30):
         if room < 1e-3:
             break
@@ -144,7 +144,7 @@ def test_the_room_shrinks_at_most_by_its_share_per_step(seed, alpha):
         u *= min(1.0, 3.0 / np.linalg.norm(u))  # nothing comes from beyond the shell
         result = layer(q, u)
         q = q + DT * result.velocity
-        after = room_at(layer.work, q, 0.0, 10.0)
+        after = slack_at(layer.work, q, 0.0, 10.0)
         if room < 0.25:  # within the shell
             assert after >= (1.0 - gamma) * room - 1e-9
             seen += 1
@@ -164,7 +164,7 @@ def test_motion_along_a_surface_is_kept():
     layer = point_among([Obstacle(Box((1.0, 1.0, 1.0)))])
     result = layer([0.0, 0.0, 0.5302], [0.3, -0.2, -1.0])
     np.testing.assert_allclose(result.velocity, [0.3, -0.2, 0.0], rtol=0, atol=1e-5)
-    assert result.status == CHANGED and result.room == pytest.approx(2e-4, abs=1e-12)
+    assert result.status == CHANGED and result.slack == pytest.approx(2e-4, abs=1e-12)
 
 
 def test_an_obstacle_margin_goes_before_the_general_distance():
@@ -274,7 +274,7 @@ def test_two_arms_driven_at_each_other_stop_at_the_distance_to_keep():
         q, rooms = np.concatenate([READY, READY]), []
         for _ in range(150):
             q = q + DT * layer(q, np.tile([0.0, 0.4, 0.0, 0.8, 0.0, 0.0, 0.0], 2)).velocity
-            rooms.append(room_at(seeing.work, q, 0.0, 1.0))
+            rooms.append(slack_at(seeing.work, q, 0.0, 1.0))
         least[layer] = min(rooms)
     assert -1e-9 <= least[seeing] < 3e-3 and least[blind] < -0.02
 
@@ -374,7 +374,7 @@ def test_a_faster_sphere_is_reported_before_it_is_too_close():
             result = point_among([ball.at(k * DT)], speed=0.5)(q, [0.0, 0.0, 0.0])
             reported |= result.blocked
             # while it is at it, it gets away as fast as it can
-            if result.blocked and result.room < 0.02 and k * DT * speed < 0.4:
+            if result.blocked and result.slack < 0.02 and k * DT * speed < 0.4:
                 assert result.velocity[0] == pytest.approx(-0.5, abs=1e-6)
             q = q + DT * result.velocity
             if np.linalg.norm(q - ball.at((k + 1) * DT).pose.position) - 0.13 < 0:
@@ -399,7 +399,7 @@ def test_a_lead_looks_at_what_moves_ahead_of_time():
     floor = Obstacle(Box((9.0, 9.0, 1.0)), Pose.from_position_quaternion([0, 0, -0.6]), (0.0, 0.0, 0.2))
     q, u = [0.0, 0.0, 0.1], np.zeros(3)
     now, later = (point_among([floor], settings=SafetySettings(lead=lead)) for lead in (0.0, 0.75))
-    assert now(q, u).status == FREE and later(q, u).room == pytest.approx(0.02, abs=1e-12)
+    assert now(q, u).status == FREE and later(q, u).slack == pytest.approx(0.02, abs=1e-12)
 
 
 # ------------------------------------------------------------------ the tick
