@@ -11,7 +11,7 @@ LEARNING := $(addprefix tests/,bench/train/test_command.py bench/train/test_hind
     baselines/learning/test_export_actor.py baselines/learning/test_learned_policy.py baselines/learning/test_learning_page.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test learn slow lint types check perf soak study docs bodies beads clean
+.PHONY: help demo test learn slow lint types check picture perf soak study docs bodies beads clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -57,6 +57,9 @@ types: $(VENV)/.developed ## pyright
 
 check: lint types test ## lint, types and tests
 
+picture: $(BIN)/python ## draw the packages and who imports whom: docs/architecture.svg
+	@$(BIN)/python tests/draw_architecture.py
+
 perf: $(VENV)/.developed ## the table of speeds
 	@$(BIN)/onedemo perf
 
@@ -71,7 +74,7 @@ docs: $(VENV)/.developed ## the page and the clip of every task: docs/tasks
 	@$(BIN)/onedemo tasks --write docs/tasks --clips
 
 bodies: $(VENV)/.developed ## fit the capsules of the robots anew (for a new robot)
-	@$(BIN)/python -c "from onedemo.envs.scene import robot_bodies as b, scene; b.TABLE.write_text(b.table_text(tuple(scene.ROBOTS)))"
+	@$(BIN)/python -c "from onedemo.envs.scene import robot_bodies as b; b.TABLE.write_text(b.table_text(tuple(b.ROBOTS)))"
 
 beads: $(VENV)/.developed ## let the beads settle in their glasses anew (for a new glass)
 	@$(BIN)/python -c "from onedemo.envs.pour import geometry as g, places as p; from onedemo.envs.scene import beads; beads.TABLE.write_text(beads.table_text(((p.WIDE, g.BEADS), (p.SLIM, g.BEADS))))"

@@ -1,22 +1,22 @@
-"""Libraries that only some policies need: imported when they are needed, named with the extra that brings them."""
+"""Optional libraries: imported only when needed, and named with the extra that installs them."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from types import ModuleType
 
-from ..planner.errors import MissingExtra
+from .errors import MissingExtra
 
 
 def needed(module: str, extra: str) -> ModuleType:
-    """A module of an optional library.
+    """Import a module of an optional library.
 
     Args:
-        module: its name.
-        extra: of the extras of onedemo the one that brings it.
+        module: name of the module.
+        extra: extra of onedemo that installs it.
 
     Raises:
-        MissingExtra: it is not installed.
+        MissingExtra: the library is not installed.
     """
     try:
         return import_module(module)

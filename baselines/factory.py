@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from ..configs import BadConfig
 from ..configs.dataclass_settings import settings_from
-from ..envs.core.description import TaskDescription
-from ..planner.errors import BadConfig, UnknownName
-from ..planner.geometry.pose import Pose
-from ..planner.imitation.demonstration import Demonstration
+from ..envs import TaskDescription
+from ..planner import Demonstration, Pose
+from ..planner.errors import UnknownName
 from ..planner.imitation.tsia import screw_path
 from .key_poses import Join, sparse
 from .learning.actor_card import METHOD
@@ -87,16 +87,17 @@ def make_policy(
     key_poses: int | None = None,
     tool: Pose | None = None,
 ) -> Policy:
-    """A policy for a task.
+    """Make a policy for a task.
 
     Args:
         name: one of `POLICIES`, or a dotted path of your own, see `own_policy`.
         task: `env.unwrapped.task`.
         demonstration: the ONE demonstration.
-        settings: the policy's settings as nested mappings; what is missing keeps its default.
-        key_poses: of each segment only so many are shown; the way between them is read as the policy would move, by
-            your own policy not at all. None: the whole demonstration is shown.
-        tool: `tcp_from_tool` of another frame of the hand, in which legs are planned and followed; see `tool_frame`.
+        settings: the policy's settings as nested mappings; a missing key keeps its default.
+        key_poses: number of poses of each segment that are shown; between them the policy interpolates in its own
+            way, a policy of your own not at all. None: the whole demonstration is shown.
+        tool: `tcp_from_tool` of another frame of the hand, in which motions are planned and followed; see
+            `tool_frame`.
 
     Raises:
         UnknownName: no such policy.
@@ -113,7 +114,16 @@ def make_policy(
 
 
 def settings_of(name: str, settings: Mapping[str, Any] | None = None) -> Any:
-    """The checked settings of a policy of `POLICIES`, from nested mappings; what is missing keeps its default."""
+    """Return the checked settings of a policy.
+
+    Args:
+        name: one of `POLICIES`.
+        settings: nested mappings; a missing key keeps its default.
+
+    Raises:
+        UnknownName: no such policy.
+        BadConfig: an unknown key, a wrong type or a value out of range.
+    """
     if name not in POLICIES:
         raise UnknownName("policy", name, POLICIES)
     kind = POLICIES[name]

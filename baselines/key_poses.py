@@ -1,7 +1,7 @@
-"""A demonstration of a few key poses: what is left of it, and how the way between them is read.
+"""Demonstrations reduced to a few key poses, and the interpolation between these.
 
-Between two key poses nobody knows what was shown. A method that interpolates along screws reads screws, one that
-moves position and orientation apart reads straight lines with slerp: what it would have done itself.
+The demonstrated motion between two key poses is unknown. A method that interpolates along screws assumes screws, and a
+method that moves position and orientation separately assumes straight lines with slerp: each assumes its own motion.
 """
 
 from __future__ import annotations
@@ -11,18 +11,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..planner.geometry.pose import Pose, PosePath
-from ..planner.imitation.demonstration import Demonstration
+from ..planner import Demonstration, Pose, PosePath
 from ..planner.imitation.segmentation import key_poses, resampled
 
 DENSE = 0.005
-"""Screw length [m] between the poses that are read between key poses, and between those that these are chosen from."""
+"""Weighted path length [m] between interpolated poses, and between the poses from which key poses are chosen."""
 Join = Callable[[Pose, Pose, float], PosePath]
-"""Poses from one to another, both included, at most a screw length [m] apart."""
+"""Interpolation from one pose to another, both included, with poses at most a path length [m] apart."""
 
 
 def filled(keys: PosePath, join: Join) -> PosePath:
-    """Key poses with the way between them."""
+    """Return key poses with interpolated poses between them.
+
+    Args:
+        keys: the key poses.
+        join: the interpolation.
+    """
     out = keys[:1]
     for k in range(len(keys) - 1):
         out = out.joined(join(keys[k], keys[k + 1], DENSE))
@@ -30,14 +34,14 @@ def filled(keys: PosePath, join: Join) -> PosePath:
 
 
 def sparse(shown: Demonstration, count: int, join: Join | None = None) -> Demonstration:
-    """A demonstration of which every segment is so many key poses; what is between the segments stays.
+    """Return a demonstration with every segment reduced to key poses; samples between segments stay.
 
-    Joints and gripper are those at the same share of the segment's way, the time goes evenly.
+    Joints and gripper are those at the same share of the segment's path length; time is spread evenly.
 
     Args:
-        shown: the whole.
-        count: key poses of a segment, at equal steps of its screw length, both ends included.
-        join: what is read between them; None: nothing, the key poses are all there is.
+        shown: the complete demonstration.
+        count: key poses per segment, at equal steps of its path length, both ends included.
+        join: interpolation between the key poses; None: none, only the key poses remain.
     """
     whole, pieces, segments, at = _columns(shown), [], [], 0
     length = 0
@@ -61,13 +65,13 @@ def sparse(shown: Demonstration, count: int, join: Join | None = None) -> Demons
 
 
 def _columns(shown: Demonstration) -> np.ndarray:
-    """(n, ...) time, pose (8), and joints and gripper where they were recorded."""
+    """Return rows (n, ...) of time, pose (8), and joints and gripper if they were recorded."""
     more = [array for array in (shown.joint_positions, shown.gripper) if array is not None]
     return np.column_stack([shown.time, shown.path.dqs, *more])
 
 
 def _following(path: PosePath, recorded: PosePath, whole: np.ndarray, start: int, stop: int) -> np.ndarray:
-    """Rows (m, ...) of a path that stands for the samples from start to stop."""
+    """Return rows (m, ...) for a path that replaces the samples from start to stop."""
     then, now = path.lengths(), recorded[start : stop + 1].lengths()
     share = then / then[-1] if then[-1] > 0.0 else np.linspace(0.0, 1.0, len(then))
     rest = [np.interp(share * now[-1], now, column) for column in whole[start : stop + 1, 9:].T]

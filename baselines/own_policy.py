@@ -1,4 +1,4 @@
-"""A user's own policy by a dotted path, `my_package.my_module:MyPolicy`; see docs/own_policy.md."""
+"""Users' own policies, given by a dotted path `my_package.my_module:MyPolicy`; see docs/own_policy.md."""
 
 from __future__ import annotations
 
@@ -8,26 +8,33 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
-from ..envs.core.description import TaskDescription
-from ..planner.errors import BadConfig, OneDemoError
-from ..planner.imitation.demonstration import Demonstration
+from ..configs import BadConfig
+from ..envs import TaskDescription
+from ..planner import Demonstration
+from ..planner.errors import OneDemoError
 from .policy import Policy
 
 FORM = "my_package.my_module:MyPolicy"
 
 
 def is_own(name: str) -> bool:
-    """True if a method is a dotted path, not the name of a policy of ours."""
+    """Return whether a method is a dotted path instead of the name of a shipped policy."""
     return ":" in name
 
 
 def own_policy(name: str, task: TaskDescription, demonstration: Demonstration, settings: Mapping[str, Any]) -> Policy:
-    """What the dotted path names, called with task, demonstration and settings.
+    """Import the object that a dotted path names, and call it with task, demonstration and settings.
 
-    The module is looked for where Python looks, and in the current folder. Importing it runs its code.
+    The module is searched on Python's path and in the current folder. Importing it runs its code.
+
+    Args:
+        name: dotted path.
+        task: see `make_policy`.
+        demonstration: see `make_policy`.
+        settings: settings of the config, unchecked.
 
     Raises:
-        BadConfig: no such module or name in it, or what it gives is no policy.
+        BadConfig: no such module or name, or the result is no policy.
     """
     make = _named(name)
     if not callable(make):
@@ -62,6 +69,6 @@ def _named(name: str) -> Any:
 
 
 def _said(error: Exception) -> str:
-    """An error in one line."""
+    """Return an error as one line."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

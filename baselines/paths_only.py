@@ -1,4 +1,4 @@
-"""The policies' ways to move a leg without a task and without physics: thousands of legs in a minute."""
+"""Motions of the policies without a task and without physics: thousands per minute."""
 
 from __future__ import annotations
 
@@ -7,13 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..planner import Arm, Body, Obstacle, Pose, PosePath, escape_path, final_path, guide_index, imitated_path
 from ..planner.errors import PlanFailed, UnknownName
-from ..planner.escape.repet import escape_path, point_tool
-from ..planner.geometry.pose import Pose, PosePath
-from ..planner.geometry.shapes import Obstacle
-from ..planner.imitation.tsia import final_path, guide_index, imitated_path
-from ..planner.robot.arm import Arm
-from ..planner.robot.body import Body
+from ..planner.escape.repet import point_tool
 from .factory import POLICIES, settings_of
 from .motion.baseline_motions import GeneratedMotionSettings
 from .motion.motion_method import MotionPlanner
@@ -23,17 +19,21 @@ from .screw_policy import ScrewSettings
 PATH_MAKERS = tuple(
     name for name, kind in POLICIES.items() if issubclass(kind.settings, GeneratedMotionSettings | ScrewSettings)
 )
-"""Policies that make a path of the tcp; what is left makes joints."""
+"""Policies that make a path of the tcp; the others make joint motions."""
 
 
 def motion_planner(name: str, arm: Arm, body: Body, settings: Mapping[str, Any] | None = None) -> MotionPlanner:
-    """What plans the legs of a policy: `.plan(demonstrated, joints, goal, obstacles)` gives a `Plan` with its joints.
+    """Return the planner of a policy's motions: `.plan(demonstrated, joints, goal, obstacles)` returns a `Plan`.
 
     Args:
         name: one of `factory.POLICIES`.
         arm: the arm.
-        body: its capsules, held object included.
-        settings: the policy's, as nested mappings.
+        body: capsules of the robot, held object included.
+        settings: settings of the policy, as nested mappings.
+
+    Raises:
+        UnknownName: no such policy.
+        BadConfig: a setting cannot be used.
     """
     chosen = settings_of(name, settings)
     return chosen.motion_method.planner(arm, body, chosen.plan)
@@ -50,21 +50,21 @@ def made_path(
     settings: Mapping[str, Any] | None = None,
     guide: int | None = None,
 ) -> PosePath:
-    """The path that a policy would make; whether it reaches the goal, or stays clear, is for a judge to say.
+    """Return the path that a policy would make; it is not checked whether it reaches the goal or stays clear.
 
     Args:
         name: one of `PATH_MAKERS`.
-        demonstrated: the segment, where it was shown.
-        start: of the tcp.
-        goal: of the tcp.
-        obstacles: where they are now.
-        tool: (m, 7) capsules that move with the tcp, see `Body.tool`; None: a ball of 5 cm about it.
-        settings: the policy's, as nested mappings.
-        guide: index in `demonstrated` of the guiding pose; None: by the settings, on a length that depends on which
-            point of the hand the tcp is.
+        demonstrated: demonstrated path of the segment.
+        start: start pose of the tcp.
+        goal: goal pose of the tcp.
+        obstacles: obstacles at their current poses.
+        tool: (m, 7) capsules that move with the tcp, see `Body.tool`; None: a ball of 5 cm radius at the tcp.
+        settings: settings of the policy, as nested mappings.
+        guide: index in `demonstrated` of the guiding pose; None: by the settings, from a path length that depends on
+            which point of the hand is the tcp.
 
     Raises:
-        PlanFailed: no way round the obstacles was found.
+        PlanFailed: no detour around the obstacles was found.
         UnknownName: no such path maker.
     """
     if name not in PATH_MAKERS:

@@ -1,4 +1,4 @@
-"""What a policy is: Stable-Baselines3's prediction shape, and what it may tell about itself afterwards."""
+"""Interface of policies: Stable-Baselines3's prediction signature, and the report of an episode."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..planner.geometry.pose import PosePath
+from ..planner import PosePath
 
 Observation = Mapping[str, np.ndarray]
+"""Entries of an observation by name."""
 
 
 @dataclass(frozen=True, slots=True)
 class LabeledPath:
-    """A path that a policy used, for drawing.
+    """Path that a policy used, for drawing.
 
     Attributes:
-        label: "demonstrated", "imitated", "final", or "escape": the way that was taken round what nobody showed.
-        motion: name of the motion it belongs to; "" where that is not known.
-        poses: the tcp in the world.
+        label: "demonstrated", "imitated", "final", or "escape": the detour around obstacles that were not demonstrated.
+        motion: name of the motion it belongs to; "" if unknown.
+        poses: poses of the tcp in the world.
     """
 
     label: str
@@ -31,13 +32,13 @@ class LabeledPath:
 
 @dataclass(frozen=True, slots=True)
 class PolicyReport:
-    """What a policy says of an episode; success is never among it, the simulator judges that.
+    """Report of a policy on an episode; it never contains success, which the simulator judges.
 
     Attributes:
         done: the policy has nothing more to do.
-        failure_reason: "" or one of `onedemo.envs.core.description.FAILURES`: why it gave up.
+        failure_reason: "", or the reason why it failed, one of `onedemo.envs.core.description.FAILURES`.
         detail: one line for the reader.
-        paths: the paths it used so far.
+        paths: paths used so far.
     """
 
     done: bool = False
@@ -47,7 +48,7 @@ class PolicyReport:
 
 
 class Policy(Protocol):
-    """Anything with Stable-Baselines3's `predict`; `report(state)` is optional."""
+    """Any object with Stable-Baselines3's `predict`; `report(state)` is optional."""
 
     def predict(
         self,
@@ -56,27 +57,39 @@ class Policy(Protocol):
         episode_start: np.ndarray | None = None,
         deterministic: bool = True,
     ) -> tuple[np.ndarray, Any]:
-        """Actions for one observation, or for a batch with a leading axis; and the next state."""
+        """Return actions for one observation, or for a batch with a leading axis, and the next state.
+
+        Args:
+            observation: one observation, or a batch of them.
+            state: state returned by the previous call; None at the start.
+            episode_start: (n_envs,) True where a new episode has started, or None.
+            deterministic: as in Stable-Baselines3.
+        """
         ...
 
 
 class EpisodePolicy(ABC):
-    """A policy that keeps a memory per episode; this class does the batching.
+    """Policy with a memory per episode; this class handles batches.
 
-    The state is a tuple with one memory per environment. A memory is changed by each call: a state is good
-    for one further call only.
+    The state is a tuple with one memory per environment. Each call changes the memories in place, so that a state is
+    valid for one further call only.
     """
 
     @abstractmethod
     def begin(self, observation: Observation) -> Any:
-        """The memory of a new episode that starts with this observation."""
+        """Return the memory of a new episode that starts with this observation."""
 
     @abstractmethod
     def act(self, observation: Observation, memory: Any) -> np.ndarray:
-        """The action for one observation."""
+        """Return the action for one observation.
+
+        Args:
+            observation: one observation, not a batch.
+            memory: memory of the episode, changed in place.
+        """
 
     def is_batch(self, observation: Observation) -> bool:
-        """True if there is a leading axis in every entry."""
+        """Return whether every entry has a leading batch axis."""
         # joint_positions is (arms, dof) in one observation
         return np.ndim(observation["joint_positions"]) == 3
 
@@ -87,12 +100,12 @@ class EpisodePolicy(ABC):
         episode_start: np.ndarray | None = None,
         deterministic: bool = True,
     ) -> tuple[np.ndarray, tuple[Any, ...]]:
-        """Actions and the next state, as Stable-Baselines3's models give them.
+        """Return actions and the next state, like Stable-Baselines3's models.
 
         Args:
             observation: one observation, or a batch of them with a leading axis in every entry.
-            state: what the previous call returned; None at the start.
-            episode_start: (n_envs,) True where a new episode has begun; None: only where state is None.
+            state: state returned by the previous call; None at the start.
+            episode_start: (n_envs,) True where a new episode has started; None: only where state is None.
             deterministic: ignored, the policy is deterministic.
         """
         batched = self.is_batch(observation)

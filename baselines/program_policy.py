@@ -1,4 +1,4 @@
-"""A policy that runs a task's program, its legs moved by whatever its settings say."""
+"""Policy that runs a task's program; its settings determine how the motions are planned."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..envs.core.description import TaskDescription
+from ..envs import TaskDescription
+from ..planner import Demonstration, MotionSettings, Pose
 from ..planner.errors import BadOption, PlanFailed, UnknownName
-from ..planner.geometry.pose import Pose
-from ..planner.imitation.demonstration import Demonstration
-from ..planner.planning.settings import MotionSettings
 from .motion.settings import ProgramSettings
 from .motion.tool_frame import ToolFrameMotion
 from .policy import EpisodePolicy, Observation, PolicyReport
@@ -35,14 +33,19 @@ PROGRAMS = {
     "tilt_pour": PourProgram,
     "insert_one": ShelveProgram,
 }
+"""Program of each task."""
 CONTROL_MODE = "joint_velocity"
 
 
 def at_rate(settings: ProgramSettings, dt: float) -> ProgramSettings:
-    """The settings with the time step [s] of a task, unless they say another one.
+    """Return the settings with the time step [s] of a task.
+
+    Args:
+        settings: settings of the program.
+        dt: time step of the task [s].
 
     Raises:
-        BadOption: they do.
+        BadOption: the settings contain another time step.
     """
     if settings.motion.dt not in (dt, MotionSettings().dt):
         raise BadOption("motion.dt", f"{settings.motion.dt} s, but the task acts every {dt} s")
@@ -50,7 +53,12 @@ def at_rate(settings: ProgramSettings, dt: float) -> ProgramSettings:
 
 
 class Episode:
-    """What the policy remembers of an episode: the hand, the running program and how it ended."""
+    """Memory of an episode: the executor, the running program and its end.
+
+    Args:
+        hand: executor of one or two arms.
+        program: program of the task.
+    """
 
     def __init__(self, hand: ArmExecutor | DualArmExecutor, program: Program):
         self.executor, self.program = hand, program
@@ -59,15 +67,19 @@ class Episode:
 
 
 class ProgramPolicy(EpisodePolicy):
-    """The program of a task, from ONE demonstration.
+    """Policy that runs a task's program from ONE demonstration.
 
-    Sees the observation, the demonstration and the static task description, nothing else.
+    It sees the observation, the demonstration and the static task description, nothing else.
 
     Args:
-        task: what to do.
-        demonstration: the one.
-        settings: of the program, and of how its legs are moved.
-        tool: `tcp_from_tool` of another frame of the hand, in which they are; None: in the tcp's.
+        task: the task.
+        demonstration: the ONE demonstration.
+        settings: settings of the program and of its motions.
+        tool: `tcp_from_tool` of another frame of the hand, whose motion is planned; None: the tcp.
+
+    Raises:
+        UnknownName: the task has no program.
+        BadOption: another control mode or time step.
     """
 
     def __init__(
@@ -83,7 +95,7 @@ class ProgramPolicy(EpisodePolicy):
         self.motion_method = settings.motion_method if tool is None else ToolFrameMotion(settings.motion_method, tool)
 
     def begin(self, observation: Observation) -> Episode:
-        """A new episode; nothing is planned yet."""
+        """Return the memory of a new episode; nothing is planned yet."""
         task, settings = self.task, self.settings
         if len(task.arms) == 2:
             hands = DualArmExecutor(task, settings, observation, self.motion_method)
@@ -99,7 +111,12 @@ class ProgramPolicy(EpisodePolicy):
         return Episode(hand, PROGRAMS[task.name](task, self.demonstration, settings, hand))
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:
-        """The next action of the program; standing still once it has ended or given up."""
+        """Return the next action of the program; stand still once it has finished or failed.
+
+        Args:
+            observation: one observation.
+            memory: memory of the episode.
+        """
         memory.executor.observation = observation
         if memory.actions is not None:
             try:
@@ -112,6 +129,11 @@ class ProgramPolicy(EpisodePolicy):
         return memory.executor.still()
 
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
-        """What happened in the episode of one environment of the state."""
+        """Return the report on the episode of one environment.
+
+        Args:
+            state: state returned by `predict`.
+            index: index of the environment.
+        """
         episode = state[index]
         return replace(episode.ended, paths=(*episode.program.paths, *episode.executor.drawn))

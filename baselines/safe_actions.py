@@ -1,4 +1,4 @@
-"""The safety layer around any policy: a Gymnasium action wrapper."""
+"""Safety layer around any policy: a Gymnasium action wrapper."""
 
 from __future__ import annotations
 
@@ -7,34 +7,37 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from ..planner.collision.robot_arrays import PREVIOUS
+from ..planner import SafetyLayer, SafetySettings
+from ..planner.collision.robot_arrays import ROW
 from ..planner.collision.self_collision import pairs_of
 from ..planner.errors import BadOption
-from ..planner.safety.safety_layer import SafetyLayer, SafetySettings
 from .policy import Observation
 from .programs.world_model import WorldModel
 
 MARGIN = 0.005
-"""Distance [m] to keep from the table and from objects: more than the arm lags, less than a grasp needs."""
+"""Margin [m] to the table and to objects: more than the arm's lag, less than a grasp needs."""
 SAFE = SafetySettings(self_distance=0.005, rest_weight=0.05, acceleration=5.0)
-"""The robots' wrists cannot follow sudden changes: what is commanded must be what is done."""
+"""Default settings, with smooth commands: the robots' wrists cannot follow sudden changes, and must follow commands."""
 WITHIN_REACH = 0.06
-"""Distance [m] of an object's center from the tcp within which fingers may touch it."""
+"""Distance [m] between an object's center and the tcp below which fingers may touch the object."""
 
 
 class SafeActions(gym.Wrapper):
-    """Change every action, whoever chose it, so that no arm touches what it should not.
+    """Wrapper that changes every action such that no arm touches a forbidden body.
 
-    The arm must not touch the table, nor objects, nor obstacles, nor itself; fingers may touch an object between
-    them. `info["safety"]` says what was done: 0 nothing, 1 the command was changed, 2 it was shortened, 3 blocked
-    (what must hold cannot hold). What is held is not known to the wrapper and not guarded.
+    The arm must not touch the table, objects, obstacles or itself; fingers may touch an object between them.
+    `info["safety"]` is the status: 0 unchanged, 1 command changed, 2 command shortened, 3 blocked (the constraints are
+    infeasible). A held object is unknown to the wrapper and not guarded.
 
-    The joints that were commanded are guarded, not those measured: the servos lag by 40 ms. Put the worst tracking
-    error, 2.5 mm in the shipped scenes, into `settings.distance`.
+    Commanded joints are guarded, not measured ones: the servos lag by 40 ms. Put the worst tracking error, 2.5 mm in
+    the shipped scenes, into `settings.distance`.
 
     Args:
-        env: an environment of this project in the control mode `joint_velocity`.
-        settings: see `SafetySettings`.
+        env: environment of this project in the control mode `joint_velocity`.
+        settings: see `SafetySettings`; None: `SAFE`.
+
+    Raises:
+        BadOption: another control mode.
     """
 
     def __init__(self, env: gym.Env, settings: SafetySettings | None = None):
@@ -51,21 +54,21 @@ class SafeActions(gym.Wrapper):
         self._observation: Observation = {}
 
     def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
-        """Start an episode; the commanded joints are those observed."""
+        """Start an episode; the commanded joints are the observed ones."""
         observation, info = self.env.reset(**kwargs)
         self._q = np.array(observation["joint_positions"])
-        # nothing of the last episode: the layer remembers speeds
+        # a new layer: the old one remembers speeds of the last episode
         self._observation, self._layer = observation, None
         return observation, {**info, "safety": 0}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Act as safely as can be."""
+        """Take the safe action; see `safe_action`."""
         safe, status = self.safe_action(np.asarray(action, dtype=np.float64))
         self._observation, reward, terminated, truncated, info = self.env.step(safe)
         return self._observation, reward, terminated, truncated, {**info, "safety": status}
 
     def safe_action(self, action: np.ndarray) -> tuple[np.ndarray, int]:
-        """The action that is taken instead, and what was done to it; the commanded joints move on with it."""
+        """Return the safe action taken instead of `action`, and the status; the commanded joints are advanced."""
         arms, dt = self._task.arms, self._task.control_dt
         rows = action.reshape(len(arms), -1)
         limits = np.array([arm.velocity_limits for arm in arms])
@@ -75,7 +78,7 @@ class SafeActions(gym.Wrapper):
         return np.column_stack([speeds / limits, rows[:, -1]]).reshape(action.shape), filtered.status
 
     def _bound_layer(self) -> SafetyLayer:
-        """The layer for what is around now; made anew only when something has moved."""
+        """Return the layer for the current surroundings, rebuilt only after a change."""
         obstacles = self._world_model.obstacles(self._observation)
         near = tuple(self._near_objects())
         if self._layer is None or self._key[0] is not obstacles or self._key[1] != near:
@@ -87,7 +90,7 @@ class SafeActions(gym.Wrapper):
                 settings=self.settings, allowed=allowed, pairs=self._pairs,
             )  # fmt: skip
             if before is not None:
-                self._layer.work[PREVIOUS] = before.work[PREVIOUS]
+                self._layer.work[ROW.previous] = before.work[ROW.previous]
         return self._layer
 
     def _near_objects(self) -> list[str]:

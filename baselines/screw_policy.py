@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..envs.core.description import TaskDescription
-from ..planner.escape.repet import RepetSettings
-from ..planner.geometry.pose import Pose
-from ..planner.imitation.demonstration import Demonstration
-from ..planner.planning.settings import PlanSettings
+from ..envs import TaskDescription
+from ..planner import Demonstration, PlanSettings, Pose, RepetSettings
 from .motion.motion_method import SCREW, MotionMethod
 from .motion.settings import ProgramSettings
 from .program_policy import PROGRAMS, ProgramPolicy
@@ -18,12 +15,12 @@ __all__ = ["PROGRAMS", "ScrewPolicy", "ScrewSettings"]
 
 @dataclass(frozen=True, slots=True)
 class ScrewSettings(ProgramSettings):
-    """How the method moves the legs of a program; what is False is an ablation of it.
+    """Settings of the method's motions; a switch set to False makes an ablation.
 
     Attributes:
-        repet: detours round obstacles; see `RepetSettings`.
-        avoid: False: no detours and no search in joint space, the safety layer alone.
-        whole_arm: False: only the hand and what it holds are looked at, as in the paper.
+        repet: settings of detours around obstacles; see `RepetSettings`.
+        avoid: False: no detours and no search in joint space, only the safety layer.
+        whole_arm: False: only the hand and the held object are checked, as in the paper.
     """
 
     repet: RepetSettings = field(default_factory=RepetSettings)
@@ -52,7 +49,14 @@ class ScrewSettings(ProgramSettings):
 
 
 class ScrewPolicy(ProgramPolicy):
-    """TSIA with screw interpolation and the dual-quaternion controller, from ONE demonstration."""
+    """TSIA with screw interpolation and the dual-quaternion controller, from ONE demonstration.
+
+    Args:
+        task: see `ProgramPolicy`.
+        demonstration: see `ProgramPolicy`.
+        settings: settings of the method; None: the defaults.
+        tool: see `ProgramPolicy`.
+    """
 
     def __init__(
         self,

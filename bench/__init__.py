@@ -1,1 +1,1 @@
-"""Running, measuring and reporting."""
+"""Benchmark: commands that run, train, measure, plan and report."""

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writing of files, and hashes of JSON values."""
 
 from __future__ import annotations
 
@@ -10,20 +10,24 @@ from typing import Any
 
 
 def canonical(value: Any) -> str:
-    """The one JSON text of a value."""
+    """Return the canonical JSON text of a value: sorted keys, no spaces, no NaN."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def sha256_of(value: Any) -> str:
-    """sha256 of the canonical JSON text, in hexadecimal digits."""
+    """Return the sha256 of a value's canonical JSON text, in hexadecimal digits."""
     return hashlib.sha256(canonical(value).encode()).hexdigest()
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file so that a crash leaves the old one or the new one.
+    """Write a file atomically: after a crash it has either its old or its new content.
+
+    Args:
+        path: file to write; a temporary file is made in the same folder.
+        text: whole content of the file.
 
     Raises:
-        OSError: it cannot be written; the old one is still there.
+        OSError: the file cannot be written; its old content is still there.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

@@ -14,7 +14,7 @@ from .interruption import INTERRUPTED
 
 BAD_INPUT = 2
 USAGE: Any = typer.BadParameter.__base__
-"""What typer raises for a wrong command line; of typer itself or of click, as the version has it."""
+"""Exception of typer for a wrong command line; its class comes from typer or from click, depending on the version."""
 app = typer.Typer(
     help="One demonstration in, a robot policy out, and a benchmark that proves it.\n\nStart with: onedemo run stack",
     no_args_is_help=True,
@@ -29,21 +29,21 @@ app.add_typer(demo_commands.app, name="demo")
 def run(
     config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped config, like stack.")],
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where run folders are made.")] = Path("runs"),
-    shard: Annotated[str | None, typer.Option(help="Only part i of n of the episodes, as i/n.")] = None,
-    retry: Annotated[bool, typer.Option("--retry", help="Run again what was lost with its worker.")] = False,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Parent of the run folder.")] = Path("runs"),
+    shard: Annotated[str | None, typer.Option(help="Run only part i of n of the episodes, given as i/n.")] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Rerun episodes lost with their worker.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the run folder, and errors.")] = False,
 ) -> None:
     """Run the episodes of a config, a whole comparison or a single cell, and write a report.
 
     Keys of a cell: name, task, method, demonstration, episodes, level, robot, seed, obstacles, env, max_seconds,
-    video, trajectories, settings. Keys with dots reach into settings: settings.motion.guide=0.2
+    video, trajectories, settings. Dotted keys change nested settings: settings.motion.guide=0.2
 
-    A comparison has lists of values under sweep, and may have defaults and exclude; a change of a swept key takes the
-    place of its values. How it is run: executor (process, serial, ray), workers, address, wall_seconds.
+    A comparison lists the values of a key under sweep, and may have defaults and exclude; setting a swept key on the
+    command line replaces its list. Execution: executor (process, serial, ray), workers, address, wall_seconds.
 
-    Finished episodes are kept, whatever happens: running the same config again goes on where it stopped. The last
-    line on standard output is the run folder.
+    Finished episodes are always kept: the same command continues where it stopped. The last line on standard output is
+    the run folder.
 
     Examples:
     - onedemo run stack
@@ -63,16 +63,16 @@ def run(
 def train(
     config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped training, like reach_sac.")],
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where folders are made.")] = Path("trainings"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Parent of the folder.")] = Path("trainings"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the folder, and errors.")] = False,
 ) -> None:
-    """Train a learner on a task from several seeds, and write its curves and its best actor.
+    """Train a learner on a task with several seeds, and write its learning curves and its best actor.
 
     Keys: name, task, algorithm (sac, ppo, sac-her, sac-demo, bc, residual), demonstration, steps, seeds, seed,
     evaluate_every, evaluate_episodes, level, robot, env, learner, executor, workers, address, wall_seconds, device.
 
-    Everything is kept up to the last evaluation, whatever happens: the same command goes on, also with more steps or
-    seeds, and ends with the same curve. The last line on standard output is the folder. Needs the extra rl.
+    Everything up to the last evaluation is always kept: the same command continues, also with more steps or seeds, and
+    yields the same curve. The last line on standard output is the folder. Needs the extra rl.
 
     Examples:
     - onedemo train reach_sac
@@ -86,16 +86,16 @@ def train(
 
 @app.command()
 def curves(
-    trainings: Annotated[list[Path], typer.Argument(metavar="TRAINING", help="Folders of onedemo train, of one task.")],
-    run: Annotated[
-        Path | None, typer.Option("--run", help="A run folder whose methods need no training: drawn as lines.")
-    ] = None,
+    trainings: Annotated[
+        list[Path], typer.Argument(metavar="TRAINING", help="Folders written by onedemo train, of one task.")
+    ],
+    run: Annotated[Path | None, typer.Option("--run", help="A run folder: its methods are drawn as lines.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the files.")] = Path("curves"),
 ) -> None:
-    """Draw trainings of one task in one figure, beside what needs no step: one demonstration, or N steps.
+    """Draw the learning curves of trainings of one task in one figure, beside methods that need no training.
 
-    Reads the folders, whether the trainings are finished or not, and trains nothing. Writes the figure (.png, .pdf),
-    every evaluation (.csv) and a page with a table (.md), the last line on standard output.
+    Reads the folders of finished and unfinished trainings, and trains nothing. Writes the figure (.png, .pdf), every
+    evaluation (.csv) and a page with a table (.md), whose path is the last line on standard output.
 
     Example: onedemo curves trainings/reach-sac-* trainings/reach-ppo-* --run runs/reach-0123456789ab
     """
@@ -108,13 +108,14 @@ def curves(
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of the same scenarios.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder for it; default: the run folder, if there is one.")
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of the report; default: the run folder, if only one is given."),
     ] = None,
 ) -> None:
-    """Write the report of a run, or compare several: tables, paired tests, figures for a paper, CSV.
+    """Write the report of a run, or compare several runs: tables, paired tests, figures for a paper, CSV.
 
-    Reads the files of the run folders and runs nothing. report.html needs no server and nothing from elsewhere; its
-    figures are also there as PNG and PDF. The last line on standard output is the page.
+    Reads the files of the run folders and runs nothing. report.html is self-contained (no server, no external files);
+    its figures are also written as PNG and PDF. The last line on standard output is the page.
 
     Examples:
     - onedemo report runs/stack-0123456789ab
@@ -130,18 +131,19 @@ def report(
 def plan(
     scene: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped scene, like wall_gap.")],
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the scene.")] = None,
-    figure: Annotated[Path | None, typer.Option("--figure", help="Draw it: .png, .pdf or .svg.")] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the plan as JSON for the judge.")] = None,
-    certify: Annotated[bool, typer.Option(help="Let the independent judge look at the plan.")] = True,
-    smooth: Annotated[bool, typer.Option("--smooth", help="Lead it along a smooth curve (C1), still clear.")] = False,
-    timed: Annotated[bool, typer.Option("--timed", help="As fast as speed and acceleration limits allow.")] = False,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="Draw the plan into this file (.png, .pdf or .svg).")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the plan as JSON, to be judged.")] = None,
+    certify: Annotated[bool, typer.Option(help="Check the plan with the independent judge.")] = True,
+    smooth: Annotated[bool, typer.Option("--smooth", help="Smooth the path to a clear C1 curve.")] = False,
+    timed: Annotated[bool, typer.Option("--timed", help="Time-optimal within speed and acceleration limits.")] = False,
 ) -> None:
-    """Plan one motion round obstacles, without a simulator, and draw it.
+    """Plan one motion around obstacles, without a simulator, and draw it.
 
     Keys of a scene: title, robot, demonstration, start, goal, obstacles, held, allowed, settings, seed. Shipped
-    scenes: free, sphere, wall_gap, shelf, clutter, cage. The exit code is 1 where no plan was found, or it does not
-    stay clear when made smooth or timed, which is said with the reason, 2 for a scene that cannot be used, and 3 for
-    a plan that the judge refuses.
+    scenes: free, sphere, wall_gap, shelf, clutter, cage. Exit code 1: no plan was found, or the smoothed or timed plan
+    does not stay clear (the reason is printed); 2: the scene cannot be used; 3: the judge refuses the plan.
 
     Example: onedemo plan wall_gap --figure gap.png
     """
@@ -152,18 +154,20 @@ def plan(
 
 @app.command()
 def reproduce(
-    names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Experiments; without a name all.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The folder.")] = Path("reproduction"),
-    episodes: Annotated[
-        int | None, typer.Option("--episodes", min=1, max=1000, help="Seeds of each; 10 if not given.")
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="Names of experiments; default: all.")
     ] = None,
-    video: Annotated[bool, typer.Option("--video/--no-video", help="A video of the first seed of each.")] = True,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of page and runs.")] = Path("reproduction"),
+    episodes: Annotated[
+        int | None, typer.Option("--episodes", min=1, max=1000, help="Number of seeds per experiment; default: 10.")
+    ] = None,
+    video: Annotated[bool, typer.Option("--video/--no-video", help="Record each experiment's first seed.")] = True,
 ) -> None:
-    """Do the paper's experiments one by one, and write a page with results, figures and times.
+    """Reproduce the paper's experiments, and write a page with results, figures and times.
 
     Known: pour, pour_obstacles, stack, shelve, shelve_one, shelve_two, bimanual (an experiment each, some minutes in
-    all), tree (escape trees with all their planes, and their times). What is finished is not run again. The last line
-    on standard output is the page.
+    all), tree (escape trees with all their planes, and their times). Finished experiments are not run again. The last
+    line on standard output is the page.
 
     Examples:
     - onedemo reproduce
@@ -177,20 +181,23 @@ def reproduce(
 
 @app.command()
 def geometric(
-    scenarios: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many.")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="That they are drawn from.")] = 0,
+    scenarios: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of scenarios.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the scenarios.")] = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("runs/geometric"),
-    method: Annotated[list[str] | None, typer.Option(help="Only this one; may be given again.")] = None,
-    workers: Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; one for each core.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Run only this method; repeatable.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Number of processes; default: one per core.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the folder, and errors.")] = False,
 ) -> None:
-    """Compare the path makers without physics, on thousands of scenarios.
+    """Compare path generators without physics, on thousands of scenarios.
 
-    Three tracks: levels L1 to L3; the demonstration thinned to a few key poses; other tool frames and other worlds.
+    Three tracks: levels L1 to L3; the demonstration thinned to a few key poses; other tool frames and world frames.
     Methods: screw, tsia, "tsia, guide 0.5", decoupled, replay, dmp-goal, "dmp-goal, screws", dmp-world, potential,
-    and rrt, which takes about a second a path and is run only if it is named.
+    and rrt, which takes about a second per path and runs only if it is named.
 
-    What is done is kept: the same command goes on where it stopped. A folder that already has a suite.jsonl uses it.
+    Finished paths are always kept: the same command continues where it stopped. If the folder holds a suite.jsonl, its
+    scenarios are used.
 
     Examples:
     - onedemo geometric
@@ -205,12 +212,12 @@ def geometric(
 @app.command()
 def perf(
     json: Annotated[Path | None, typer.Option("--json", help="Also write the rows to this file.")] = None,
-    only: Annotated[str, typer.Option("--only", help="Part of a line's name, or a shell pattern.")] = "*",
+    only: Annotated[str, typer.Option("--only", help="Part of a row's name, or a shell pattern.")] = "*",
 ) -> None:
     """Measure speeds, as ratios within one run: machines differ and are shared.
 
-    A line is well when its value is at most its goal; the exit code is 1 if one is not. Lines that need
-    what is not installed are skipped (extras "peers" and "rl").
+    A row passes if its value does not exceed its limit; the exit code is 1 if a row fails. Rows that need packages
+    that are not installed are skipped (extras "peers" and "rl").
 
     Example: onedemo perf --only controller --json perf.json
     """
@@ -221,8 +228,8 @@ def perf(
 
 @app.command()
 def tasks(
-    write: Annotated[Path | None, typer.Option("--write", help="Write a page for each task into this folder.")] = None,
-    clips: Annotated[bool, typer.Option("--clips", help="With --write: also record a looping clip of each.")] = False,
+    write: Annotated[Path | None, typer.Option("--write", help="Write a page per task into this folder.")] = None,
+    clips: Annotated[bool, typer.Option("--clips", help="With --write: also record a looping clip each.")] = False,
 ) -> None:
     """List the environments, or write a documentation page for each.
 
@@ -264,7 +271,7 @@ def version() -> None:
 
 
 def usage_line(error: Any) -> str:
-    """What is wrong with the command line and what is allowed; "" if help was printed instead."""
+    """Return the mistake in the command line and the valid options in one line; "" if help was printed instead."""
     text = " ".join(error.format_message().split()).rstrip(".")
     context = getattr(error, "ctx", None)
     if not text or context is None:
@@ -279,7 +286,7 @@ def usage_line(error: Any) -> str:
 
 
 def main() -> None:
-    """Entry point: errors of the project and of the command line become one line, exit code 2."""
+    """Run the command line; errors of the project and of the command line become one line and exit code 2."""
     from ..planner.errors import OneDemoError
 
     try:

@@ -1,4 +1,4 @@
-"""Where words and files go: results to standard output, progress and errors to standard error."""
+"""Terminal output: results go to standard output, progress and errors to standard error."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..planner.errors import BadConfig
+from ..configs import BadConfig
 
 COMMAND_LINE = "command line"
 NO_LIBRARY = "cannot open shared object file"
@@ -20,21 +20,32 @@ if TYPE_CHECKING:
 
 
 def console(*, stderr: bool = False, quiet: bool = False) -> Console:
-    """A rich console that wraps nothing and takes no text for markup; quiet ones print nothing."""
+    """Return a rich console that neither wraps lines nor interprets markup.
+
+    Args:
+        stderr: write to standard error instead of standard output.
+        quiet: print nothing.
+    """
     from rich.console import Console
 
     return Console(stderr=stderr, quiet=quiet, highlight=False, markup=False, soft_wrap=True)
 
 
 def labeled(label: str, style: str, text: str) -> Text:
-    """A colored word in front of a text."""
+    """Return a text with a colored label in front.
+
+    Args:
+        label: word in front of the text.
+        style: rich style of the label, like "red" or "bold".
+        text: text after the label, in the default style.
+    """
     from rich.text import Text
 
     return Text.assemble((label, style), f"  {text}")
 
 
 def missing_library(error: BaseException) -> str:
-    """What to install, if an error says that a shared library is missing; else ""."""
+    """Return advice on packages to install if an error reports a missing shared library, else ""."""
     if not isinstance(error, ImportError | OSError) or NO_LIBRARY not in str(error):
         return ""
     library = str(error).partition(":")[0]
@@ -42,10 +53,14 @@ def missing_library(error: BaseException) -> str:
 
 
 def check_writable(option: str, path: Path) -> None:
-    """Refuse a file that cannot be written, before the work that it is for.
+    """Refuse an unwritable output file before the work starts.
+
+    Args:
+        option: command line option that named the file.
+        path: file to be written later.
 
     Raises:
-        BadConfig: naming the option, the path and why.
+        BadConfig: the file cannot be written; the error names option, path and reason.
     """
     folder = path.parent
     if path.is_dir():
@@ -58,10 +73,14 @@ def check_writable(option: str, path: Path) -> None:
 
 @contextmanager
 def writing(option: str, path: Path) -> Iterator[None]:
-    """Make it one line if a file cannot be written after all.
+    """Turn an `OSError` inside the `with` block into a one-line error.
+
+    Args:
+        option: command line option that named the file.
+        path: file written inside the block.
 
     Raises:
-        BadConfig: naming the option, the path and why.
+        BadConfig: the file cannot be written; the error names option, path and reason.
     """
     try:
         yield

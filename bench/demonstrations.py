@@ -1,4 +1,4 @@
-"""`onedemo demo …`: look at a demonstration, make one from a recording."""
+"""`onedemo demo …`: inspect a demonstration, or make one from a recording."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..planner.errors import UnknownName
 from .console import check_writable, console, labeled, writing
 
 if TYPE_CHECKING:
-    from ..planner.imitation.demonstration import Demonstration, Segment
+    from ..planner import Demonstration, Segment
 
 IMPORTED = ("", "pour")
-"""Tasks that a recording of poses may be made a demonstration of; "" for none."""
+"""Tasks for which a pose recording can become a demonstration; "" for no task."""
 app = typer.Typer(
-    help="Look at a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="markdown"
+    help="Inspect a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="markdown"
 )
 
 
@@ -25,18 +25,19 @@ app = typer.Typer(
 def check(
     file: Annotated[str, typer.Argument(help="A demonstration (.npz), or the name of a shipped one, like stack.")],
 ) -> None:
-    """Validate a demonstration and say what is in it.
+    """Validate a demonstration and print its content.
 
-    Prints duration, samples, the segments with the screw that each amounts to, source, licence, and warnings
-    about what a careful reader would want to know. Exits with 2 and one line if the file cannot be used.
+    Prints duration, samples, the segments with the screw motion of each, source, licence, and warnings about anything
+    unusual. Exits with code 2 and one line if the file cannot be used.
 
     Example: onedemo demo check stack
     """
+    from ..planner import read_demonstration
     from ..planner.imitation.demonstration import warnings_of
-    from ..planner.imitation.demonstration_files import UNITS, load_demonstration
+    from ..planner.imitation.demonstration_files import UNITS
 
     path = demonstration_path(file)
-    demo = load_demonstration(path)
+    demo = read_demonstration(path)
     out = console()
     out.print(labeled(demo.name, "bold", f"{demo.source} {demo.robot}, task {demo.task or '-'}"))
     out.print(f"  file      {path}")
@@ -60,20 +61,20 @@ def check(
 def import_(
     raw: Annotated[Path, typer.Argument(help="The recording: .npz of a robosuite teleoperation, or .npy/.csv poses.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The demonstration to write (.npz).")],
-    name: Annotated[str, typer.Option(help="Its name; default: the output file's.")] = "",
-    robot: Annotated[str, typer.Option(help="Whose hand moved.")] = "Panda",
+    name: Annotated[str, typer.Option(help="Name of the demonstration; default: the output file's name.")] = "",
+    robot: Annotated[str, typer.Option(help="Robot of the recording.")] = "Panda",
     licence: Annotated[str, typer.Option(help="Licence of the data.")] = "unknown",
     source: Annotated[str, typer.Option(help="Poses only: teleoperated, kinesthetic or scripted.")] = "kinesthetic",
     units: Annotated[str, typer.Option(help="Poses only: m, cm or mm.")] = "m",
     quaternion: Annotated[str, typer.Option(help="Poses only: order of the columns, wxyz or xyzw.")] = "wxyz",
-    rate: Annotated[float, typer.Option(help="Poses only: samples per second.")] = 0.0,
-    task: Annotated[str, typer.Option(help="Poses only: pour, for a glass in the hand from start to end.")] = "",
+    rate: Annotated[float, typer.Option(help="Poses only: sampling rate [Hz].")] = 0.0,
+    task: Annotated[str, typer.Option(help="Poses only: pour, if a glass is held from start to end.")] = "",
 ) -> None:
     """Make a demonstration from a recording.
 
-    A robosuite teleoperation (.npz with t, q, actions, obj_cubeA_jnt0, obj_cubeB_jnt0) goes through the robot's
-    forward kinematics and is cut where the gripper moves. Rows of poses (.npy or .csv: x y z and a quaternion)
-    are cut where the hand rests.
+    A robosuite teleoperation (.npz with t, q, actions, obj_cubeA_jnt0, obj_cubeB_jnt0) is converted by the robot's
+    forward kinematics and segmented where the gripper moves. Pose tables (.npy or .csv: x y z and a quaternion) are
+    segmented where the hand rests.
 
     Examples (the first one makes the shipped demonstration, up to rounding):
     - onedemo demo import panda_teleop_stack.npz -o stack.npz --licence "MIT, see LICENSE-robosuite.txt"
@@ -82,7 +83,7 @@ def import_(
 
     - onedemo demo import panda_pouring.npy -o pour_real.npz --units cm --rate 100 --task pour
     """
-    from ..planner.imitation.demonstration_files import save_demonstration
+    from ..planner import save_demonstration
     from ..planner.imitation.import_recordings import from_pose_table, stack_from_teleoperation
 
     check_writable("--output", output)
@@ -90,9 +91,10 @@ def import_(
         raise UnknownName("task of a pose recording", task, IMPORTED)
     title = name or output.stem
     if raw.suffix == ".npz":
+        from ..envs.scene.robots import robot_named
         from ..envs.scene.scene import robot_arm
 
-        demo = stack_from_teleoperation(raw, robot_arm(robot), name=title, licence=licence)
+        demo = stack_from_teleoperation(raw, robot_arm(robot_named(robot)), name=title, licence=licence)
     else:
         demo = from_pose_table(
             raw,
@@ -112,7 +114,7 @@ def import_(
 
 
 def _with_glasses(demo: Demonstration) -> Demonstration:
-    """A recording of pouring with the glasses that were not recorded; says where they stand."""
+    """Return a recording of pouring with the glasses that were not recorded, and print where they stand."""
     from ..baselines.recording.import_pour import pour_from_poses
 
     placed = pour_from_poses(demo)
@@ -123,13 +125,13 @@ def _with_glasses(demo: Demonstration) -> Demonstration:
 
 @app.command()
 def record(
-    task: Annotated[str, typer.Argument(help="The task to show, like pour.")],
+    task: Annotated[str, typer.Argument(help="Task to demonstrate, like pour.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The demonstration to write (.npz).")],
 ) -> None:
     """Record the scripted demonstration of a task on the simulated robot.
 
-    A script moves the arm along waypoints (baselines/record_*.py) under physics; what is recorded is what the joint
-    encoders measure. A demonstration that does not succeed is not written.
+    A script moves the arm along waypoints (baselines/recording) under physics; the recording holds the positions
+    measured by the joint encoders. A demonstration that fails is not written.
 
     Example: onedemo demo record pour --output pour.npz
     """
@@ -137,7 +139,7 @@ def record(
 
     from .. import envs  # noqa: F401  (registers the ids)
     from ..baselines.recording.recorders import RECORDERS
-    from ..planner.imitation.demonstration_files import save_demonstration
+    from ..planner import save_demonstration
     from .task_table import TASKS
 
     check_writable("--output", output)
@@ -154,7 +156,7 @@ def record(
 
 
 def _segment_lines(demo: Demonstration, segment: Segment) -> tuple[str, str]:
-    """What a segment does, and the screw from its first to its last pose."""
+    """Return two lines: what a segment does, and the screw motion from its first to its last pose."""
     import numpy as np
 
     from ..planner.geometry.dualquat import screw_parameters

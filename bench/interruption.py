@@ -1,4 +1,4 @@
-"""How a command that may be interrupted ends: its lines and its folder, or why it stopped and what is kept."""
+"""Ending of commands that may be interrupted: results and folder, or the reason for stopping and what is kept."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ DISK_FULL, INTERRUPTED = 3, 130
 
 
 def ended(work: Callable[[], list[str]], folder: Path, kept: str, *, quiet: bool) -> int:
-    """Do the work and print its lines; returns the exit code.
+    """Do the work, print its lines and the folder, and return the exit code.
 
     Args:
-        work: what is done; its lines are for the terminal.
-        folder: where results are written; printed last.
-        kept: what is in it, whatever stops the work.
+        work: does the work and returns lines for the terminal.
+        folder: folder of the results; printed last.
+        kept: plural noun for what the folder keeps if the work is interrupted, like "finished episodes".
         quiet: print only the folder, and errors.
+
+    Returns:
+        0, `INTERRUPTED` after Ctrl-C, or `DISK_FULL` after an error of the file system.
     """
     try:
         lines = work()

@@ -1,4 +1,4 @@
-"""How each method is drawn, always alike, and what it needs besides an episode."""
+"""Style of each method in figures, always the same, and what the method needs besides an episode."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import zlib
 from dataclasses import dataclass
 
 REFERENCE = "screw"
-"""The method that all others are compared with."""
+"""Method that all others are compared with."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Color and marker of a method: either alone tells it from its neighbors, for whoever does not see the colors.
+    """Color and marker of a method; either alone is distinctive, for readers who do not see the colors.
 
     Attributes:
-        color: of Okabe and Ito's or Tol's color-blind safe sets.
-        marker: matplotlib's.
-        line: matplotlib's line style.
+        color: from Okabe and Ito's or Tol's color-blind safe sets.
+        marker: matplotlib marker.
+        line: matplotlib line style.
     """
 
     color: str
@@ -43,17 +43,19 @@ LOOKS = {
     "ppo": Look("#aa4499", ">"),
     "residual": Look("#661100", "8"),
 }
-"""In the order of tables and legends."""
+"""Look of every known method, in the order of tables and legends."""
 SPARE = ("#ee8866", "#ddaa33", "#bb5566", "#004488", "#777777", "#aa3377")
+"""Colors of methods that are not in `LOOKS`."""
 WITHOUT_DEMONSTRATION = ("rrt", "sac", "sac-her", "ppo")
+"""Methods that use no demonstration."""
 STEPS_KEYS = ("env_steps", "training_steps", "total_steps", "steps")
-"""Names under which the settings of a method that learns say how long."""
+"""Settings keys under which learning methods state their number of training steps."""
 ACTOR_KEYS = ("sha256", "training_steps")
-"""Settings that a run writes down of an actor; nobody has chosen them."""
+"""Settings recorded by a run about its actor; they do not count as tuned."""
 
 
 def look_of(method: str) -> Look:
-    """The look of a method; one that is not known has the same in every report."""
+    """Return the look of a method; an unknown method gets a look from a hash of its name, equal in every report."""
     if method in LOOKS:
         return LOOKS[method]
     number = zlib.crc32(method.encode())
@@ -61,13 +63,18 @@ def look_of(method: str) -> Look:
 
 
 def other_look(method: str, number: int) -> Look:
-    """The look of the (number + 1)-th line of a method in one figure: the first one's is the method's own."""
+    """Return the look of the (number + 1)-th line of one method in a figure.
+
+    Args:
+        method: name of the method.
+        number: index of the line among those of the method; line 0 has the method's own look.
+    """
     if number == 0:
         return look_of(method)
     return Look(SPARE[(number - 1) % len(SPARE)], "osD^vP"[(number - 1) % 6], (":", "-.")[(number - 1) // 6 % 2])
 
 
 def place_of(method: str) -> tuple[int, str]:
-    """Sorting key of a method."""
+    """Return the sorting key of a method: the order of `LOOKS`, then unknown methods by name."""
     known = list(LOOKS)
     return (known.index(method) if method in known else len(known), method)

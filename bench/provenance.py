@@ -1,4 +1,4 @@
-"""On what a run was made: versions, commit, processor."""
+"""Provenance of a run: versions, commit, processor."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 
 PACKAGES = ("onedemo", "numpy", "numba", "mujoco", "robosuite", "gymnasium", "pin", "scipy", "matplotlib")
 LEARNING = ("torch", "stable_baselines3")
-"""What a training depends on besides."""
+"""Packages that trainings depend on in addition."""
 
 
 def fingerprint(*more: str) -> dict[str, object]:
-    """What a reader needs to judge whether a run can be repeated bit by bit.
+    """Return what a reader needs to judge whether a run can be repeated bit by bit.
 
     Args:
-        more: packages that count besides.
+        more: packages to list besides `PACKAGES`.
     """
     return {
         "python": platform.python_version(),
@@ -43,7 +43,7 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    """The commit of the source tree, with "+" if it is changed; "" for an installed package."""
+    """Return the commit of the source tree, with "+" if there are changes; "" for an installed package."""
     folder = Path(__file__).resolve().parent.parent
     if not (folder / ".git").exists():
         return ""

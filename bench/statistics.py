@@ -1,7 +1,7 @@
-"""Numbers of a table: intervals, paired tests and their correction, all on scipy and all from stated seeds.
+"""Statistics of the tables: intervals, paired tests and their correction, all by scipy and with fixed seeds.
 
-Not in the paper. The number of episodes is fixed by the config before the first one runs: nothing here is for looking
-at results and going on until they please.
+Not in the paper. The config fixes the number of episodes before the first one runs: nothing here supports optional
+stopping (looking at results and adding episodes until they please).
 """
 
 from __future__ import annotations
@@ -14,15 +14,23 @@ import numpy as np
 
 Values = Sequence[float] | np.ndarray
 RESAMPLES = 2000
-"""Draws of a bootstrap: the error of its 95 % ends is then some percent of their distance."""
+"""Draws of a bootstrap: the ends of its 95 % interval then have an error of a few percent of the interval's width."""
 MEDIANS = 1000
 """Draws of a bootstrap of medians."""
 AT_ONCE = 2_000_000
-"""Numbers drawn together."""
+"""Numbers drawn per batch, which bounds the memory."""
 
 
 def wilson(successes: int, episodes: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a success rate; (0, 1) without episodes."""
+    """Return Wilson's 95 % interval of a success rate; (0, 1) without episodes.
+
+    Args:
+        successes: number of successes.
+        episodes: number of episodes.
+
+    Returns:
+        Lower and upper end, in [0, 1].
+    """
     from scipy.stats import binomtest
 
     if episodes == 0:
@@ -32,12 +40,16 @@ def wilson(successes: int, episodes: int) -> tuple[float, float]:
 
 
 def median(values: Values) -> float:
-    """Median; NaN of nothing."""
+    """Return the median; NaN without values."""
     return float(np.median(values)) if len(values) else float("nan")
 
 
 def median_interval(values: Values) -> tuple[float, float, float]:
-    """Median and its 95 % interval: percentiles of a bootstrap, the same for the same values; NaN of nothing."""
+    """Return the median and its 95 % interval: percentiles of a bootstrap with a fixed seed.
+
+    Returns:
+        Median, lower and upper end; NaN without values.
+    """
     array = np.asarray(values, dtype=np.float64)
     if not len(array):
         return math.nan, math.nan, math.nan
@@ -48,28 +60,36 @@ def median_interval(values: Values) -> tuple[float, float, float]:
 
 
 def quantile(values: Values, q: float) -> float:
-    """Quantile, for example 0.99; NaN of nothing."""
+    """Return a quantile; NaN without values.
+
+    Args:
+        values: (n,) sample.
+        q: probability in [0, 1], for example 0.99.
+    """
     return float(np.quantile(values, q)) if len(values) else float("nan")
 
 
 def interquartile_mean(values: Values) -> float:
-    """Mean of the middle half: less moved by outliers than the mean, less wasteful than the median; NaN of nothing."""
+    """Return the mean of the middle half of the values; NaN without values.
+
+    It is more robust against outliers than the mean and statistically more efficient than the median.
+    """
     from scipy.stats import trim_mean
 
     return float(trim_mean(values, 0.25)) if len(values) else float("nan")
 
 
 def only_one(pairs: Sequence[tuple[bool, bool]]) -> tuple[int, int]:
-    """In how many pairs the first alone succeeds, and in how many the second."""
+    """Count the pairs in which only the first succeeds, and those in which only the second succeeds."""
     return pairs.count((True, False)), pairs.count((False, True))
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
-    """Exact two-sided McNemar p-value: of the pairs in which one alone succeeds, is either the likelier one?
+    """Return the exact two-sided McNemar p-value of two methods succeeding equally often; 1 without discordant pairs.
 
     Args:
-        only_first: pairs in which the first succeeds and the second does not.
-        only_second: the other way round.
+        only_first: number of pairs in which the first succeeds and the second fails.
+        only_second: number of pairs in which the second succeeds and the first fails.
     """
     from scipy.stats import binomtest
 
@@ -78,14 +98,14 @@ def mcnemar(only_first: int, only_second: int) -> float:
 
 
 class Difference(NamedTuple):
-    """A mean of differences of pairs.
+    """Mean difference of pairs, with interval and test.
 
     Attributes:
-        mean: first minus second.
+        mean: mean of first minus second.
         low: lower end of its 95 % interval.
-        high: upper end.
-        p: two-sided p-value of "there is none".
-        pairs: how many there were.
+        high: upper end of its 95 % interval.
+        p: two-sided p-value of the null hypothesis that the mean difference is zero.
+        pairs: number of pairs.
     """
 
     mean: float
@@ -96,15 +116,24 @@ class Difference(NamedTuple):
 
 
 FEWEST = 8
-"""Pairs; fewer have too few different draws, some without any spread, whose scores mean nothing."""
+"""Fewest pairs for a bootstrap: fewer have too few distinct draws, some of them without any spread, whose scores mean
+nothing."""
 
 
 def paired_bootstrap(first: np.ndarray, second: np.ndarray, seed: int = 0) -> Difference:
-    """Mean difference of pairs (n,) with its interval by the studentized bootstrap; NaN of fewer than `FEWEST`.
+    """Return the mean difference of pairs with its interval by the studentized bootstrap.
 
-    Each draw takes n pairs with replacement and measures its mean in its own standard errors. The quantiles of that
-    give the interval, and how often it is farther out than the sample's own mean the p-value, so that both tell the
-    same story. Efron and Tibshirani, An Introduction to the Bootstrap, chapters 12 and 16.
+    Each draw takes n pairs with replacement and measures the deviation of its mean in its own standard errors. The
+    quantiles of these scores give the interval; the share of scores beyond the sample's own mean gives the p-value, so
+    that interval and p-value agree. Efron and Tibshirani, An Introduction to the Bootstrap, chapters 12 and 16.
+
+    Args:
+        first: (n,) values of the first method.
+        second: (n,) values of the second method on the same scenarios.
+        seed: random seed of the draws.
+
+    Returns:
+        The difference; interval and p-value are NaN for fewer than `FEWEST` pairs.
     """
     away = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     n = len(away)
@@ -118,7 +147,7 @@ def paired_bootstrap(first: np.ndarray, second: np.ndarray, seed: int = 0) -> Di
     for start in range(0, RESAMPLES, rows):
         drawn = away[rng.integers(n, size=(min(rows, RESAMPLES - start), n))]
         errors = drawn.std(axis=1, ddof=1) / math.sqrt(n)
-        # a draw of equal pairs alone has no error of its own: it is given the sample's
+        # a draw of identical pairs has no spread of its own: the sample's standard error replaces it
         parts.append((drawn.mean(axis=1) - mean) / np.where(errors > 1e-9 * error, errors, error))
     scores = np.concatenate(parts)
     low, high = np.quantile(scores, [0.025, 0.975])
@@ -127,7 +156,7 @@ def paired_bootstrap(first: np.ndarray, second: np.ndarray, seed: int = 0) -> Di
 
 
 def holm(values: Sequence[float]) -> list[float]:
-    """Holm's adjusted p-values, in their order; NaN stays NaN and is not counted. S. Holm, 1979."""
+    """Return Holm's adjusted p-values in the given order; NaN stays NaN and does not count as a test. S. Holm, 1979."""
     p = np.asarray(values, dtype=np.float64)
     known = np.flatnonzero(~np.isnan(p))
     order = known[np.argsort(p[known], kind="stable")]
@@ -143,10 +172,19 @@ def hierarchical_bootstrap(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> tuple[float, float, float]:
-    """A statistic of all values and its 95 % interval, where values come in groups: episodes of training seeds.
+    """Return a statistic of grouped values (episodes of training seeds) and its 95 % interval.
 
-    Each draw takes groups with replacement, then values of each: training anew is the larger part of the spread, and
-    episodes of one trained policy are no independent ones.
+    Each draw takes groups with replacement, then values of each group: retraining causes the larger part of the spread,
+    and episodes of one trained policy are not independent samples of the method.
+
+    Args:
+        groups: one sample (n,) per group; empty groups are skipped.
+        statistic: maps all values (m,) to a number.
+        seed: random seed of the draws.
+        resamples: number of draws.
+
+    Returns:
+        Statistic, lower and upper end; NaN without values.
     """
     arrays = [np.asarray(group, dtype=np.float64) for group in groups if len(group)]
     if not arrays:
@@ -160,7 +198,14 @@ def hierarchical_bootstrap(
 
 
 class Rate(NamedTuple):
-    """A share of episodes with its 95 % interval."""
+    """Share of episodes with its 95 % interval.
+
+    Attributes:
+        count: number of episodes that count.
+        episodes: number of all episodes.
+        low: lower end of the interval.
+        high: upper end of the interval.
+    """
 
     count: int
     episodes: int
@@ -169,10 +214,15 @@ class Rate(NamedTuple):
 
     @staticmethod
     def of(count: int, episodes: int) -> Rate:
-        """With Wilson's interval."""
+        """Return a rate with Wilson's interval.
+
+        Args:
+            count: number of episodes that count.
+            episodes: number of all episodes.
+        """
         return Rate(count, episodes, *wilson(count, episodes))
 
     @property
     def share(self) -> float:
-        """The rate; NaN without episodes."""
+        """Share of the episodes that count; NaN without episodes."""
         return self.count / self.episodes if self.episodes else float("nan")

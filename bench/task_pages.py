@@ -1,4 +1,4 @@
-"""`onedemo tasks`: the environments in the terminal, and a documentation page for each, made from its docstring."""
+"""`onedemo tasks`: list the environments, or write a documentation page of each from its docstring."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from .task_table import TASKS
 
 CLIP_SIZE = (480, 360)
 CLIP_SECONDS = 8.0
-"""Length of a clip; the episode is played as fast as that needs."""
+"""Duration of a clip; the playback speed follows from it."""
 CLIP_FRAMES = 96
 CLIP_QUALITY = 55
 MOST_PICTURES = 300
-"""Drawn of an episode that takes its whole time."""
+"""Largest number of pictures rendered of an episode that takes its whole time limit."""
 
 
 def list_tasks() -> None:
-    """Print id, meaning, robots and time limit of every environment."""
+    """Print id, summary, time limit and shipped config of every environment."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -32,7 +32,7 @@ def list_tasks() -> None:
 
 
 def environment_class(identifier: str) -> type:
-    """The class behind an id; the simulator is loaded."""
+    """Return the class behind a Gymnasium id; loads the simulator."""
     from gymnasium.envs.registration import load_env_creator
 
     made: Any = load_env_creator(str(_spec(identifier).entry_point))
@@ -40,12 +40,12 @@ def environment_class(identifier: str) -> type:
 
 
 def summary_of(identifier: str) -> str:
-    """The first sentence of an environment's docstring."""
+    """Return the first paragraph of an environment's docstring in one line."""
     return " ".join(str(inspect.getdoc(environment_class(identifier))).split("\n\n")[0].split())
 
 
 def page_text(task: str) -> str:
-    """The documentation page of a task's environment as Markdown: its docstring beneath its picture."""
+    """Return the Markdown page of a task's environment: its docstring below its clip."""
     facts = TASKS[task]
     summary, _, rest = str(inspect.getdoc(environment_class(facts.id))).partition("\n\n")
     parts = [
@@ -60,7 +60,18 @@ def page_text(task: str) -> str:
 
 
 def write_pages(folder: Path, *, clips: bool) -> list[Path]:
-    """Write the page of every task, and its clip if wanted; the files written."""
+    """Write the page of every task, and its clip if wanted.
+
+    Args:
+        folder: folder of the pages; made if missing.
+        clips: also record a clip for each page.
+
+    Returns:
+        The files written.
+
+    Raises:
+        BadConfig: a file cannot be written.
+    """
     written = []
     for task in TASKS:
         page = folder / f"{task}.md"
@@ -74,9 +85,19 @@ def write_pages(folder: Path, *, clips: bool) -> list[Path]:
 
 
 def write_clip(task: str, file: Path) -> Path:
-    """A looping clip of the planner's first episode of a task's shipped config."""
-    from ..configs.grid import load_config
-    from ..configs.shipped_files import shipped_config
+    """Record a looping clip of the planner's first episode of a task's shipped config.
+
+    Args:
+        task: name of the task.
+        file: the .webp to write.
+
+    Returns:
+        The file.
+
+    Raises:
+        BadConfig: the file cannot be written.
+    """
+    from ..configs import load_config, shipped_config
     from .episodes.episode import run_episode
     from .episodes.scenarios import scenarios_of
     from .run.episode_jobs import made, policy_for
@@ -96,7 +117,7 @@ def write_clip(task: str, file: Path) -> Path:
 
 
 def _picture(env: Any, before: list[Any], every: int) -> Any:
-    """Every so many states an image, None for the others."""
+    """Return an image of every `every`-th state, None for the others."""
     from PIL import Image
 
     return Image.fromarray(env.render()).resize(CLIP_SIZE) if len(before) % every == 0 else None

@@ -1,4 +1,4 @@
-"""What running and reporting must know of each task besides its environment."""
+"""Task facts that running and reporting need besides the environment."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from ..envs.pour.geometry import TARGET
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """The number that says how well a success went.
+    """Error measure of a task: the number that tells how accurate a success was.
 
     Attributes:
-        key: its name in `info` and in the records; the largest of several counts.
-        words: what it is called.
-        unit: in which it is printed.
-        factor: from the recorded number to that unit.
+        key: name of the number in `info` and in the records; the largest of several values counts.
+        words: name in tables.
+        unit: unit in tables.
+        factor: conversion factor from the recorded number to that unit.
     """
 
     key: str
@@ -26,16 +26,17 @@ class Error:
 
 @dataclass(frozen=True, slots=True)
 class TaskFacts:
-    """A task as the program's face sees it.
+    """Facts about a task for commands and reports.
 
     Attributes:
-        id: Gymnasium's.
-        error: see `Error`.
-        task_metrics: metrics that no method can have been made for, each with its key in `info`; see `metric_table`.
-        compared_segment: the segment of its demonstration whose motion matters; "" where there is none to compare with.
-        poured_into: index of the glass that is poured into; None: nothing is poured.
-        upright: what is carried should be kept level.
-        demonstrated_task: the task that its demonstration shows, where that is another one; "" for itself.
+        id: Gymnasium id of the environment.
+        error: error measure, see `Error`.
+        task_metrics: neutral metrics of the task, which favor no method by construction: name in `metric_table` to
+            key in `info`.
+        compared_segment: the segment of its demonstration whose motion is compared; "" if there is none.
+        poured_into: index of the target glass; None if nothing is poured.
+        upright: True if the carried object should stay upright.
+        demonstrated_task: the task of its demonstration if that is another task; "" otherwise.
     """
 
     id: str
@@ -83,3 +84,4 @@ TASKS = {
     ),
     "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, demonstrated_task="pour"),
 }
+"""All tasks by name."""

@@ -1,4 +1,4 @@
-"""Settings dataclasses read from YAML: every key known, every value checked."""
+"""Settings dataclasses read from YAML: unknown keys are refused, every value is checked."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from ..planner.errors import BadConfig, OneDemoError
+from ..planner.errors import OneDemoError
+from .errors import BadConfig
 
 Settings = TypeVar("Settings")
 
 
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:
-    """Read a settings dataclass, nested ones included, from mappings as YAML gives them.
+    """Read a settings dataclass, including nested ones, from mappings as parsed from YAML.
 
-    A key by which a field was known before (`metadata["formerly"]`) is taken for the field.
+    A field's former key (`metadata["formerly"]`) is accepted for the field.
 
     Args:
-        kind: the dataclass.
-        values: of its fields; those that are missing have their defaults.
-        source: the file, for messages.
+        kind: dataclass to read.
+        values: values by field; missing fields have their defaults.
+        source: name of the file, for messages.
 
     Raises:
         BadConfig: an unknown key, a field given by both of its names, or a value that the field refuses.
@@ -41,17 +42,17 @@ def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) 
 
 @cache
 def _adapter(kind: type) -> TypeAdapter:
-    """Pydantic's view of a dataclass, which takes longer to make than many a path."""
+    """Return pydantic's adapter of a dataclass, cached: building it takes longer than planning many a path."""
     return TypeAdapter(kind)
 
 
 def _class_of(kind: Any) -> Any:
-    """The class, also of an optional one."""
+    """Return the dataclass of a type, also of an optional one."""
     return next((part for part in get_args(kind) if is_dataclass(part)), kind)
 
 
 def _with_new_names(kind: Any, values: Any, source: str, prefix: str) -> Any:
-    """The values under the present names of the fields."""
+    """Return the values under the present names of the fields."""
     kind = _class_of(kind)
     if not (is_dataclass(kind) and isinstance(values, Mapping)):
         return values
@@ -69,7 +70,7 @@ def _with_new_names(kind: Any, values: Any, source: str, prefix: str) -> Any:
 
 
 def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:
-    """Refuse keys that no field has: validation of dataclasses would pass over them."""
+    """Refuse keys without a field: pydantic's validation of dataclasses ignores them."""
     kind = _class_of(kind)
     if not (is_dataclass(kind) and isinstance(values, Mapping)):
         return

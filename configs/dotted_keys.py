@@ -1,4 +1,4 @@
-"""Nested mappings by keys with dots: `settings.motion.guide`."""
+"""Access to nested mappings by dotted keys: `settings.motion.guide`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ MISSING: Any = object()
 
 
 def at(values: Mapping[str, Any], key: str) -> Any:
-    """The value at a key with dots; MISSING if there is none."""
+    """Return the value at a dotted key; MISSING if there is none.
+
+    Args:
+        values: nested mapping.
+        key: dotted key.
+    """
     here: Any = values
     for part in key.split("."):
         if not isinstance(here, Mapping) or part not in here:
@@ -19,7 +24,13 @@ def at(values: Mapping[str, Any], key: str) -> Any:
 
 
 def having(values: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """The mapping with a value at a key with dots; what stands in the way is replaced."""
+    """Return the mapping with a value at a dotted key; a value in the place of an inner mapping is replaced.
+
+    Args:
+        values: nested mapping.
+        key: dotted key.
+        value: value to set.
+    """
     first, _, rest = key.partition(".")
     inside = values.get(first)
     if rest:
@@ -28,7 +39,12 @@ def having(values: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
 
 
 def without(values: Mapping[str, Any], key: str) -> dict[str, Any]:
-    """The mapping without a key with dots, and without mappings that this leaves empty."""
+    """Return the mapping without a dotted key, and without mappings that become empty.
+
+    Args:
+        values: nested mapping.
+        key: dotted key.
+    """
     first, _, rest = key.partition(".")
     result = dict(values)
     inside = result.pop(first, None)
@@ -38,7 +54,12 @@ def without(values: Mapping[str, Any], key: str) -> dict[str, Any]:
 
 
 def merged(weak: Mapping[str, Any], strong: Mapping[str, Any]) -> dict[str, Any]:
-    """Both, mappings merged; where they disagree, the strong one."""
+    """Return both mappings merged, nested ones included.
+
+    Args:
+        weak: nested mapping.
+        strong: nested mapping whose values win where they conflict.
+    """
     result = dict(weak)
     for key, value in strong.items():
         before: Any = result.get(key)
@@ -48,7 +69,12 @@ def merged(weak: Mapping[str, Any], strong: Mapping[str, Any]) -> dict[str, Any]
 
 
 def leaves(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys with dots and values of all that is not a mapping with something in it."""
+    """Yield dotted key and value of everything except non-empty mappings.
+
+    Args:
+        values: nested mapping.
+        prefix: text before every key.
+    """
     for key, value in values.items():
         if isinstance(value, Mapping) and value:
             yield from leaves(value, f"{prefix}{key}.")

@@ -1,4 +1,4 @@
-"""A comparison: the cells that one config file stands for."""
+"""Comparisons: the cells described by one config file."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..planner.errors import BadConfig
 from .dotted_keys import MISSING, at, having, leaves, merged, without
+from .errors import BadConfig
 from .run_config import CELL_KEYS, LATER, RUN_KEYS, Default, RunConfig, RunSettings, digest_of, reason_of, unknown_key
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
 
 MAX_CELLS = 10_000
 ALLOWED = (*CELL_KEYS, *RUN_KEYS)
 FIXED = ("name", "video", "trajectories")
-"""Keys that are the same in all cells."""
+"""Keys with the same value in all cells."""
 NAMING = ("task", "robot", "level", "method")
-"""Keys that a cell is called by."""
+"""Keys that name a cell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +29,11 @@ class Grid:
     """All cells of a run.
 
     Attributes:
-        source: the file.
-        changed: keys that the command line changed.
-        written: what the file holds, with these changes.
-        settings: how the cells are made and run.
-        cells: in order.
+        source: config file.
+        changed: keys changed on the command line.
+        written: contents of the file, with these changes.
+        settings: how the cells are generated and run.
+        cells: cells in order.
     """
 
     source: Path
@@ -48,11 +48,11 @@ class Grid:
         return self.cells[0].name
 
     def digest(self) -> str:
-        """Twelve hexadecimal digits of all that decides what is in the table."""
+        """Return twelve hexadecimal digits of all values that determine the table."""
         return digest_of([self.name, [[cell.digest(), cell.episodes] for cell in self.cells]])
 
     def label(self, cell: RunConfig) -> str:
-        """What a cell is, in words: task, robot, level, method, and what else is swept."""
+        """Return a cell in words: task, robot, level, method, and other swept keys."""
         values = cell.model_dump(mode="json")
         more = [key for key in self.settings.sweep if key not in NAMING]
         found = {key: at(values, key) for key in more}
@@ -60,15 +60,19 @@ class Grid:
         return " ".join([*(values[key] for key in NAMING), *named])
 
     def blame(self, key: str) -> str | Path:
-        """Where a key was written: the command line or the file."""
+        """Return the place where a key was written: the command line or the file."""
         return _blame(self.source, self.changed, key)
 
 
 def load_grid(path: str | Path, overrides: list[str] | None = None) -> Grid:
-    """A config file with `key=value` changes, checked; a change of a swept key takes the place of its values.
+    """Load and check a config file with `key=value` changes; a change of a swept key replaces its values.
+
+    Args:
+        path: config file.
+        overrides: changes, each `key=value`.
 
     Raises:
-        BadConfig: naming the file, or the command line, and the key, and what is allowed.
+        BadConfig: names the file, or the command line, and the key, and the allowed values.
     """
     changes = overrides or []
     changed = tuple(text.partition("=")[0] for text in changes)
@@ -89,10 +93,14 @@ def load_grid(path: str | Path, overrides: list[str] | None = None) -> Grid:
 
 
 def load_config(path: str | Path, overrides: list[str] | None = None) -> RunConfig:
-    """The only cell of a config file with `key=value` changes, checked.
+    """Load and check the only cell of a config file with `key=value` changes.
+
+    Args:
+        path: config file.
+        overrides: changes, each `key=value`.
 
     Raises:
-        BadConfig: naming the file, or the command line, and the key, and what is allowed.
+        BadConfig: names the file, or the command line, and the key, and the allowed values; or there are several cells.
     """
     cells = load_grid(path, overrides).cells
     if len(cells) != 1:
@@ -106,7 +114,7 @@ def _blame(path: str | Path, changed: tuple[str, ...], key: str) -> str | Path:
 
 
 def _unfolded(sweep: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
-    """A sweep with nested mappings for keys with dots, so that changes find them."""
+    """Return a sweep with nested mappings instead of dotted keys, so that changes find them."""
     result: dict[str, Any] = {}
     for key, values in leaves(sweep):
         if at(result, key) is not MISSING:
@@ -116,7 +124,7 @@ def _unfolded(sweep: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
 
 
 def _settings(values: dict[str, Any], path: str | Path, changed: tuple[str, ...]) -> RunSettings:
-    """The keys besides those of a cell, and whether what they speak of are keys of a cell."""
+    """Return the run settings, after checking that the keys they refer to are keys of a cell."""
     try:
         settings = RunSettings.model_validate({key: values[key] for key in RUN_KEYS if key in values})
     except ValidationError as error:
@@ -174,7 +182,7 @@ def _cells(
         if cell.digest() in cells:
             raise BadConfig(path, "sweep", f"gives the same cell twice: {_combination(chosen)}")
         cells[cell.digest()] = cell
-    # a change on the command line may well leave nothing to exclude
+    # after a change on the command line, a condition may rightly exclude nothing
     if not all(used) and not changed:
         raise BadConfig(path, f"exclude.{used.index(False)}", "leaves out nothing: no combination has these values")
     if not cells:
@@ -193,7 +201,7 @@ def _cell(values: dict[str, Any], chosen: dict[str, Any], path: str | Path, chan
 
 
 def _matches(values: Mapping[str, Any], condition: Mapping[str, Any]) -> bool:
-    """Whether a cell has the values, or one of those listed; keys that are not written have their default."""
+    """Return whether a cell has the values, or one of the listed ones; missing keys have their default."""
     for key, wanted in condition.items():
         value = at(values, key)
         if value is MISSING and key in RunConfig.model_fields:

@@ -1,4 +1,4 @@
-"""What learners are given where a training config says nothing; part of a training's digest."""
+"""Learner arguments that hold unless a training config sets them; part of a training's digest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OFF_POLICY: dict[str, Any] = {
     "train_freq": 2,
     "learning_starts": 1000,
     "buffer_size": 1_000_000,
-    # from 1, what entropy earns hides these rewards for the first 20 000 steps
+    # starting from 1, the entropy bonus hides these rewards for the first 20 000 steps
     "ent_coef": "auto_0.01",
 }
 PPO: dict[str, Any] = {
@@ -34,5 +34,5 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "ppo": PPO,
     "bc": {"hidden": [128, 128], "learning_rate": 1e-3, "batch_size": 64},
 }
-"""By algorithm. `hidden`: widths of the hidden layers; `envs`: environments that are stepped at once in one process;
-`n_sampled_goal`: hindsight goals per transition. All else: the library's own arguments."""
+"""Arguments by algorithm. `hidden`: widths of the hidden layers; `envs`: environments stepped at once in one
+process; `n_sampled_goal`: hindsight goals per transition. The others are the library's own arguments."""

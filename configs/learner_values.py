@@ -1,4 +1,4 @@
-"""What common arguments of learners may be: of the others the learner itself finds out, once it is built."""
+"""Allowed values of common learner arguments; the learner checks the others when it is built."""
 
 from __future__ import annotations
 
@@ -24,7 +24,12 @@ KINDS: dict[str, Any] = {
 
 
 def misfit_of(key: str, value: Any) -> str:
-    """Why an argument cannot have a value; "" if it can, as far as is known here."""
+    """Return the reason why an argument cannot have a value, "" if it can as far as is known here.
+
+    Args:
+        key: name of the argument.
+        value: value to check.
+    """
     if key not in KINDS:
         return ""
     try:

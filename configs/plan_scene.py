@@ -1,4 +1,4 @@
-"""Scenes to plan in: a YAML file in, the planner's objects out, every mistake named by file and key."""
+"""Planning scenes: a YAML file in, the planner's objects out; every error names file and key."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..planner.errors import BadConfig, BadDemonstration, OneDemoError, UnfitShape, UnknownName
-from ..planner.geometry.pose import Pose, PosePath
-from ..planner.geometry.shapes import LARGEST, Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
-from ..planner.imitation.demonstration_files import load_demonstration, unit_poses
+from ..planner import Box, Capsule, Cylinder, Mesh, Obstacle, Pose, PosePath, Shape, Sphere, read_demonstration
+from ..planner.errors import BadDemonstration, OneDemoError, UnfitShape, UnknownName
+from ..planner.geometry.shapes import LARGEST
+from ..planner.imitation.demonstration_files import unit_poses
 from ..planner.imitation.segmentation import resampled
+from .errors import BadConfig
 from .plan_scene_schema import HeldItem, Placed, Recorded, SceneConfig, ShapeFields, checked
 from .shipped_files import FOLDER, shipped_demonstration
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
 
 STEP = 0.005
-"""Screw length [m] between poses of a demonstration, so that pauses weigh nothing."""
+"""Path length [m] between poses of a demonstration, so that pauses have no weight."""
 ANYWHERE = (0.0, 0.0, 0.0)
 
 
@@ -29,9 +30,9 @@ class HeldObject:
     """An object in the hand.
 
     Attributes:
-        name: for messages and allowed pairs.
-        shape: its form.
-        tcp_from_object: where it is in the hand.
+        name: name for messages and allowed pairs.
+        shape: shape of the object.
+        tcp_from_object: pose of the object in the tcp frame.
     """
 
     name: str
@@ -41,16 +42,16 @@ class HeldObject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanScene:
-    """A leg to plan, but for the arm, which only higher floors can make.
+    """A motion to plan, without the arm, which only higher layers can build.
 
     Attributes:
-        source: the file.
-        changed: first parts of the keys that the command line changed.
-        config: what was written.
-        demonstrated: in equal steps of screw length.
-        goal: of the tcp.
-        obstacles: where they are.
-        held: what is in the hand, None if nothing.
+        source: scene file.
+        changed: first parts of the keys changed on the command line.
+        config: contents of the file.
+        demonstrated: demonstrated path in equal steps of path length.
+        goal: goal pose of the tcp.
+        obstacles: obstacles in the world.
+        held: object in the hand, or None.
     """
 
     source: Path
@@ -63,30 +64,30 @@ class PlanScene:
 
     @property
     def name(self) -> str:
-        """The file's name without its ending."""
+        """File name without its suffix."""
         return self.source.stem
 
     @property
     def allowed(self) -> tuple[tuple[str, str], ...]:
-        """Pairs (part of the body, obstacle) that may touch."""
+        """Pairs (body part, obstacle) that may touch."""
         return tuple((mine, other) for mine, other in self.config.allowed)
 
     @contextmanager
     def blaming(self, key: str) -> Iterator[None]:
-        """Errors of what is made inside name the file, or the command line, and the key."""
+        """Make errors raised inside name the file, or the command line, and the key."""
         with _blaming(self.source, self.changed, key):
             yield
 
     def file(self, name: str) -> Path:
-        """A file that the scene names: beside the scene if it is there, else as it stands."""
+        """Return a file named in the scene: beside the scene file if it exists there, else the path as written."""
         return _beside(self.source, name)
 
 
 def shipped_scene(name: str) -> Path:
-    """File of a scene that comes with the package, like "sphere".
+    """Return the file of a shipped scene, like "sphere".
 
     Raises:
-        UnknownName: there is none of that name; the message lists them.
+        UnknownName: no such scene; the message lists the known ones.
     """
     known = {path.stem: path for path in sorted((FOLDER / "scenes").glob("*.yaml"))}
     if name not in known:
@@ -95,10 +96,14 @@ def shipped_scene(name: str) -> Path:
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> PlanScene:
-    """A scene file with `key=value` changes.
+    """Load a scene file with `key=value` changes.
+
+    Args:
+        path: scene file.
+        overrides: changes, each `key=value`.
 
     Raises:
-        BadConfig: naming the file, or the command line, and the key, and what is allowed.
+        BadConfig: names the file, or the command line, and the key, and the allowed values.
     """
     source = Path(path)
     changed = frozenset(text.partition("=")[0].split(".")[0] for text in overrides)
@@ -120,7 +125,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> PlanScene:
 
 
 def pose_of(placed: Placed) -> Pose:
-    """The pose that a table describes."""
+    """Return the pose that a table describes."""
     return _placed(placed)
 
 
@@ -154,7 +159,7 @@ def _demonstrated(source: Path, wanted: Recorded | list[list[float]]) -> PosePat
         return PosePath.from_vectors(poses)
     plain = Path(wanted.file).suffix == "" and len(Path(wanted.file).parts) == 1
     file = _beside(source, wanted.file)
-    demonstration = load_demonstration(shipped_demonstration(wanted.file) if plain and not file.is_file() else file)
+    demonstration = read_demonstration(shipped_demonstration(wanted.file) if plain and not file.is_file() else file)
     return demonstration.path if wanted.segment is None else demonstration.segment_path(wanted.segment)
 
 
@@ -165,7 +170,7 @@ def _pose(vector: Sequence[float]) -> Pose:
 
 
 def _near(positions: np.ndarray) -> np.ndarray:
-    """The positions (..., 3), if they are in metres."""
+    """Return the positions (..., 3) if they are plausible in meters."""
     farthest = float(np.abs(positions).max())
     if farthest > LARGEST:
         raise UnfitShape("pose", "position", f"{farthest:g} m away: millimetres?")

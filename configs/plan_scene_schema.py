@@ -1,4 +1,4 @@
-"""What a scene file may hold: the table of its keys. `scene` makes the planner's objects of it."""
+"""Schema of scene files; `plan_scene` builds the planner's objects from it."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ class Placed(Strict):
     """A pose.
 
     Attributes:
-        position: (3,) [m].
-        quaternion: wxyz.
-        rpy_degrees: roll, pitch and yaw about the fixed axes x, y and z, in that order; [180, 0, yaw] points down.
-        yaw_degrees: upright, turned about z.
+        position: (3,) position [m].
+        quaternion: (4,) rotation, wxyz.
+        rpy_degrees: roll, pitch and yaw about the fixed axes x, y and z, in this order; [180, 0, yaw] points down.
+        yaw_degrees: yaw about z of an upright pose.
     """
 
     position: Point
@@ -69,7 +69,15 @@ class Placed(Strict):
 
 
 class ShapeFields(Strict):
-    """A shape: radius for a sphere, radius and length for capsule and cylinder, size for a box, vertices for a mesh."""
+    """A shape: radius for a sphere, radius and length for capsule and cylinder, size for a box, vertices for a mesh.
+
+    Attributes:
+        shape: kind of the shape.
+        radius: radius [m].
+        length: length [m], of a capsule without its caps.
+        size: (3,) full extents [m].
+        vertices: (n, 3) vertices [m]; the shape is their convex hull.
+    """
 
     shape: Literal["sphere", "capsule", "box", "cylinder", "mesh"]
     radius: float | None = None
@@ -89,7 +97,13 @@ class ShapeFields(Strict):
 
 
 class ObstacleItem(ShapeFields, Placed):
-    """An obstacle: a shape, where it is, and what else the planner's `Obstacle` has."""
+    """An obstacle: a shape, its pose, and further fields of the planner's `Obstacle`.
+
+    Attributes:
+        velocity: (3,) velocity of its center in the world [m/s].
+        margin: safety distance to this obstacle [m]; None: the general one.
+        name: name for messages and allowed pairs.
+    """
 
     velocity: Point = [0.0, 0.0, 0.0]
     margin: float | None = None
@@ -97,14 +111,26 @@ class ObstacleItem(ShapeFields, Placed):
 
 
 class HeldItem(ShapeFields):
-    """An object in the hand."""
+    """An object in the hand.
+
+    Attributes:
+        name: name for messages and allowed pairs.
+        tcp_from_object: pose of the object in the tcp frame.
+    """
 
     name: str = "held"
     tcp_from_object: Placed
 
 
 class UrdfRobot(Strict):
-    """An arm from a file; the root link stands at the origin unless `base` says where."""
+    """An arm from a URDF file.
+
+    Attributes:
+        urdf: URDF file.
+        tcp_frame: name of the tcp's frame in the file.
+        velocity_limits: largest joint speeds [rad/s or m/s]; None: those of the file.
+        base: pose of the root link in the world; None: the origin.
+    """
 
     urdf: str
     tcp_frame: str
@@ -113,26 +139,31 @@ class UrdfRobot(Strict):
 
 
 class Recorded(Strict):
-    """A recorded demonstration: a shipped name or a file, all of it or one segment."""
+    """A recorded demonstration.
+
+    Attributes:
+        file: name of a shipped demonstration, or a file.
+        segment: name of one segment; None: the whole demonstration.
+    """
 
     file: str
     segment: str | None = None
 
 
 class SceneConfig(Strict):
-    """One leg to plan.
+    """A motion to plan.
 
     Attributes:
-        title: for pictures.
+        title: title of pictures.
         robot: robosuite's name, or a URDF file.
         demonstration: a recording, or pose vectors (x y z [m], then quaternion wxyz) joined by screw motions.
-        start: joints [rad or m], or "home".
-        goal: of the tcp; a pose vector or a table.
-        obstacles: shapes in the world.
-        held: what is in the hand.
+        start: start joints [rad or m], or "home".
+        goal: goal pose of the tcp, as a pose vector or a table.
+        obstacles: obstacles in the world.
+        held: object in the hand, or None.
         allowed: pairs of a part of the body (or a held object) and an obstacle that may touch.
-        settings: of the planner, nested; see `PlanSettings`.
-        seed: of the planner's random choices.
+        settings: settings of the planner, nested; see `PlanSettings`.
+        seed: seed of the planner's random choices.
     """
 
     title: str = ""
@@ -160,7 +191,7 @@ class SceneConfig(Strict):
 
 
 def checked(values: dict[str, Any]) -> SceneConfig | tuple[str, str]:
-    """The config, or the key of the first mistake and what is wrong there."""
+    """Return the config, or the key of the first error and its reason."""
     try:
         return SceneConfig.model_validate(values)
     except ValidationError as error:

@@ -1,10 +1,12 @@
-"""What a benchmark config may hold: one cell of a comparison, and how the whole of it is run."""
+"""Schema of benchmark configs: one cell of a comparison, and how all cells are run."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from difflib import get_close_matches
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -23,15 +25,15 @@ Meters = Annotated[float, Field(ge=-1, le=1)]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Condition = Annotated[dict[str, Any], Field(min_length=1)]
 BESIDE = ("name", "video", "trajectories", "episodes")
-"""Keys that do not decide how an episode goes."""
+"""Keys that do not affect the course of an episode."""
 IMPLIED: dict[str, dict[str, Any]] = {"S": {"key_poses": 6}, "T": {"tool": (0.1, 0.0, 0.0, 90.0)}}
-"""What a level says of the run where the cell does not."""
+"""Values implied by a level where the cell gives none."""
 LATER = ("key_poses", "tool")
-"""Keys that are written, and decide, only where they have a value."""
+"""Keys that are written, and part of the digest, only if they have a value."""
 
 
 def digest_of(value: Any) -> str:
-    """Twelve hexadecimal digits of anything that JSON can hold."""
+    """Return twelve hexadecimal digits of the hash of any JSON value."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -41,23 +43,23 @@ class RunConfig(BaseModel):
 
     Attributes:
         name: first part of the run folder's name.
-        task: what to do, like "stack".
-        method: the policy, like "screw".
+        task: name of the task, like "stack".
+        method: name of the policy, like "screw".
         demonstration: name of a shipped demonstration, or a file.
-        episodes: how many scenarios.
-        level: how far they differ from the demonstration.
-        robot: robosuite's name.
-        seed: scenario k has the seed `seed + k`.
-        obstacles: their kind; None: what the level says.
-        key_poses: how many of each segment of the demonstration are shown to the method; None: all of it is, at level
-            S 6 are.
-        tool: x, y, z [m] and turn about z [deg] of another frame in the tcp's, in which the method moves the hand;
-            None: the tcp's own, at level T [0.1, 0, 0, 90].
-        env: more arguments of the environment, like `n_blocks` of stacking.
-        max_seconds: simulated time limit of an episode; None: the task's own.
-        video: make videos: of the first failure of each kind, and of the first episode where there is a single cell.
-        trajectories: keep what is measured at every tick, one .npz per episode that is run.
-        settings: of the method; see its own settings for the keys.
+        episodes: number of scenarios.
+        level: difficulty: how far scenarios differ from the demonstration.
+        robot: robosuite's name of the robot.
+        seed: seed of the first scenario; scenario k has the seed `seed + k`.
+        obstacles: kind of obstacles; None: that of the level.
+        key_poses: number of key poses per segment of the demonstration given to the method; None: all poses, at level S
+            6.
+        tool: x, y, z [m] and turn about z [deg], in the tcp frame, of another frame in which the method moves the hand;
+            None: the tcp frame itself, at level T [0.1, 0, 0, 90].
+        env: further arguments of the environment, like `n_blocks` of stacking.
+        max_seconds: simulated time limit of an episode [s]; None: that of the task.
+        video: whether to make videos: of the first failure of each kind, and of the first episode of a single cell.
+        trajectories: whether to keep the measurements of every tick, one .npz per episode.
+        settings: settings of the method, with its own keys.
     """
 
     model_config = STRICT
@@ -88,12 +90,12 @@ class RunConfig(BaseModel):
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_asked_for(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # a cell without these has the digest that it had before there were any
+        # a cell without these keys keeps the digest it had before they were introduced
         return {key: value for key, value in written(self).items() if value is not None or key not in LATER}
 
     @property
     def condition(self) -> str:
-        """The level, with what else must be said of it: "S 6" of six key poses."""
+        """Level, with key poses and tool if they differ from it: "S 6" for six key poses."""
         implied = IMPLIED.get(self.level, {})
         words = [self.level]
         if self.key_poses is not None:
@@ -103,16 +105,16 @@ class RunConfig(BaseModel):
         return " ".join(words)
 
     def digest(self) -> str:
-        """Twelve hexadecimal digits of all that decides how an episode goes: all but `BESIDE`."""
+        """Return twelve hexadecimal digits of all values that affect the course of an episode: all but `BESIDE`."""
         return digest_of(self.model_dump(mode="json", exclude=set(BESIDE)))
 
 
 class Default(BaseModel):
-    """What holds for some cells unless it is written elsewhere.
+    """Values for some cells, unless they are set elsewhere.
 
     Attributes:
-        when: key: value, or list of values, that a cell has; keys with dots reach into mappings.
-        set: keys of a cell; mappings are merged.
+        when: required values of a cell's keys, one or a list of alternatives each; dotted keys reach into mappings.
+        set: values of a cell's keys; mappings are merged.
     """
 
     model_config = STRICT
@@ -122,16 +124,16 @@ class Default(BaseModel):
 
 
 class RunSettings(BaseModel):
-    """What a config may hold besides the keys of a cell.
+    """Keys of a config besides those of a cell.
 
     Attributes:
-        sweep: key: list of values; there is a cell for each combination, the first key varying slowest.
-        defaults: for some of the cells; weaker than what is written outside of them, later ones stronger than earlier.
-        exclude: conditions of combinations that are left out.
+        sweep: list of values per key; there is a cell for each combination, the first key varying slowest.
+        defaults: values for some of the cells; weaker than values set elsewhere, later ones stronger than earlier ones.
+        exclude: conditions of excluded combinations.
         executor: where episodes run: in this process, in worker processes, or in Ray's actors.
-        workers: how many; None: one for each processor core.
-        address: of a Ray cluster; None: a local one.
-        wall_seconds: real time after which an episode's worker counts as hung.
+        workers: number of workers; None: one per processor core.
+        address: address of a Ray cluster; None: a local one.
+        wall_seconds: real time [s] after which an episode's worker counts as hung.
     """
 
     model_config = STRICT
@@ -149,8 +151,18 @@ CELL_KEYS = tuple(RunConfig.model_fields)
 RUN_KEYS = tuple(RunSettings.model_fields)
 
 
+def cell_of(values: Mapping[str, Any]) -> RunConfig:
+    """Return the cell of a mapping as `model_dump(mode="json")` gives it, validated once per process."""
+    return _cell_of(json.dumps(values, sort_keys=True))
+
+
+@lru_cache(maxsize=1024)
+def _cell_of(text: str) -> RunConfig:
+    return RunConfig.model_validate(json.loads(text))
+
+
 def json_schema() -> dict[str, Any]:
-    """JSON schema of a config file, for editors."""
+    """Return the JSON schema of a config file, for editors."""
     cell, run = RunConfig.model_json_schema(), RunSettings.model_json_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -165,14 +177,24 @@ def json_schema() -> dict[str, Any]:
 
 
 def unknown_key(key: str, allowed: tuple[str, ...]) -> str:
-    """Why a key is refused, and what may have been meant."""
+    """Return the message that refuses a key, with the key that may have been meant.
+
+    Args:
+        key: refused key.
+        allowed: allowed keys.
+    """
     close = get_close_matches(key, allowed, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""
     return f"unknown key; {hint}allowed: {', '.join(allowed)}"
 
 
 def reason_of(error: Any, allowed: tuple[str, ...]) -> str:
-    """One of pydantic's errors in the project's words."""
+    """Return the message for one of pydantic's errors, in the project's words.
+
+    Args:
+        error: pydantic's error, as a mapping.
+        allowed: allowed keys, for an unknown key.
+    """
     if error["type"] == "extra_forbidden":
         return unknown_key(str(error["loc"][-1]), allowed)
     if error["type"] == "missing":

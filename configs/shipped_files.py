@@ -1,4 +1,4 @@
-"""The files that are installed with the package."""
+"""Files installed with the package."""
 
 from __future__ import annotations
 
@@ -17,43 +17,47 @@ def _shipped(kind: str, folder: str, suffix: str, name: str) -> Path:
 
 
 def shipped_demonstration(name: str) -> Path:
-    """File of a demonstration that comes with the package, like "stack".
+    """Return the file of a shipped demonstration, like "stack".
 
     Raises:
-        UnknownName: there is none of that name; the message lists them.
+        UnknownName: no such demonstration; the message lists the known ones.
     """
     return _shipped("demonstration", "demos", ".npz", name)
 
 
 def shipped_config(name: str) -> Path:
-    """File of a benchmark config that comes with the package, like "stack".
+    """Return the file of a shipped benchmark config, like "stack".
 
     Raises:
-        UnknownName: there is none of that name; the message lists them.
+        UnknownName: no such config; the message lists the known ones.
     """
     return _shipped("config", "bench", ".yaml", name)
 
 
 def shipped_training(name: str) -> Path:
-    """File of a training config that comes with the package, like "reach_sac".
+    """Return the file of a shipped training config, like "reach_sac".
 
     Raises:
-        UnknownName: there is none of that name; the message lists them.
+        UnknownName: no such training config; the message lists the known ones.
     """
     return _shipped("training", "train", ".yaml", name)
 
 
 def shipped_actor(name: str) -> Path:
-    """The .json of an actor that comes with the package, like "sac-stack-Panda".
+    """Return the .json file of a shipped actor, like "sac-stack-Panda".
 
     Raises:
-        UnknownName: there is none of that name; the message lists them.
+        UnknownName: no such actor; the message lists the known ones.
     """
     return _shipped("actor", "actors", ".json", name)
 
 
 def demonstration_path(name: str) -> Path:
-    """The file itself if there is one of that name, else the shipped demonstration."""
+    """Return the named file if the name looks like a file, else the shipped demonstration of this name.
+
+    Raises:
+        UnknownName: neither a file nor a shipped demonstration.
+    """
     path = Path(name)
     looks_like_a_file = path.suffix or path.exists() or len(path.parts) > 1
     return path if looks_like_a_file else shipped_demonstration(name)

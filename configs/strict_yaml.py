@@ -1,7 +1,7 @@
-"""Strict YAML: what is written is what is meant.
+"""Strict YAML: a text means exactly what it says.
 
-YAML 1.2 through ruamel.yaml (`1e-3` is a number, `no` is a text), without anchors, aliases and tags, without
-duplicate keys, at most 256 KiB.
+YAML 1.2 through ruamel.yaml (`1e-3` is a number, `no` is a string), without anchors, aliases, tags and duplicate keys,
+at most 256 KiB.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, NodeEvent
 
-from ..planner.errors import BadConfig
+from .errors import BadConfig
 
 MAX_BYTES = 256 * 1024
 COMMAND_LINE = "command line"
 
 
 def load_mapping(path: str | Path) -> dict[str, Any]:
-    """The mapping in a YAML file.
+    """Load the mapping in a YAML file.
 
     Raises:
-        BadConfig: naming the file and the line or key.
+        BadConfig: names the file and the line or key.
     """
     path = Path(path)
     if not path.is_file():
@@ -42,10 +42,14 @@ def load_mapping(path: str | Path) -> dict[str, Any]:
 
 
 def with_overrides(values: dict[str, Any], overrides: list[str]) -> dict[str, Any]:
-    """The mapping with `key=value` changes; keys with dots reach into nested mappings, values are YAML.
+    """Return the mapping with `key=value` changes.
+
+    Args:
+        values: nested mapping.
+        overrides: changes, each `key=value`; dotted keys reach into nested mappings, values are YAML.
 
     Raises:
-        BadConfig: not of that form, or reaching into something that is not a mapping.
+        BadConfig: a change has another form, or reaches into a value that is not a mapping.
     """
     result = _copied(values)
     for text in overrides:
@@ -63,7 +67,15 @@ def with_overrides(values: dict[str, Any], overrides: list[str]) -> dict[str, An
 
 
 def parse(text: str, source: str | Path) -> Any:
-    """The value of a YAML text."""
+    """Return the value of a YAML text.
+
+    Args:
+        text: YAML text.
+        source: name of the text's origin, for messages.
+
+    Raises:
+        BadConfig: the text is not YAML, or uses anchors, aliases or tags.
+    """
     try:
         for event in YAML(typ="safe", pure=True).parse(text):
             _refuse_indirection(event, source)

@@ -1,4 +1,4 @@
-"""What a training config may hold: one learner on one task, from several seeds."""
+"""Schema of training configs: one learner on one task, from several seeds."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from ..planner.errors import BadConfig
+from .errors import BadConfig
 from .learner_defaults import DEFAULTS
 from .run_config import STRICT, Name, digest_of, reason_of, unknown_key
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
 
 ALGORITHMS = ("sac", "ppo", "sac-her", "sac-demo", "bc", "residual")
 BESIDE = ("name", "steps", "seeds", "executor", "workers", "address", "wall_seconds", "device")
-"""Keys that do not decide how a seed's curve goes as far as it goes."""
+"""Keys that do not affect the course of a seed's learning curve."""
 Positive = Annotated[int, Field(ge=1, le=1_000_000_000)]
 
 
@@ -22,25 +22,26 @@ class TrainConfig(BaseModel):
     """A learner on a task.
 
     Attributes:
-        name: first part of the folder's name.
-        task: which, like "reach".
+        name: first part of the training folder's name.
+        task: name of the task, like "reach".
         algorithm: "sac" and "ppo" learn from rewards alone; "sac-her" from goals, with hindsight; "sac-demo" keeps the
             ONE demonstration in its buffer, half of every batch; "bc" clones it; "residual" corrects the method by SAC.
-        demonstration: name of a shipped demonstration, or a file; what only learns from rewards does not look at it.
-        steps: of the environment, for each seed; gradient steps of "bc". May be raised later: training goes on.
-        seeds: how many.
-        seed: of the first one.
-        evaluate_every: steps between two evaluations; state and curve are written there.
-        evaluate_episodes: how many; scenario k has the seed k, as in a comparison.
-        level: of the episodes.
-        robot: robosuite's name.
-        env: more arguments of the environment, like `onto` of placing.
-        learner: arguments of the learner, see docs/learning.md; what is missing keeps its default.
+        demonstration: name of a shipped demonstration, or a file; ignored by algorithms that learn from rewards alone.
+        steps: number of environment steps per seed; gradient steps for "bc". May be raised later: training then
+            continues.
+        seeds: number of seeds.
+        seed: first seed.
+        evaluate_every: number of steps between two evaluations, at which state and curve are written.
+        evaluate_episodes: number of episodes per evaluation; scenario k has the seed k, as in a comparison.
+        level: difficulty level of the episodes.
+        robot: robosuite's name of the robot.
+        env: further arguments of the environment, like `onto` of placing.
+        learner: arguments of the learner, see docs/learning.md; missing ones keep their defaults.
         executor: where seeds are trained: this process, worker processes, or Ray's actors.
-        workers: how many at once; None: one for each processor core.
-        address: of a Ray cluster; None: a local one.
-        wall_seconds: real time for `evaluate_every` steps after which a worker counts as hung.
-        device: torch's; "auto": a GPU if there is one.
+        workers: number of seeds trained at once; None: one per processor core.
+        address: address of a Ray cluster; None: a local one.
+        wall_seconds: real time [s] for `evaluate_every` steps after which a worker counts as hung.
+        device: torch's device; "auto": a GPU if there is one.
     """
 
     model_config = STRICT
@@ -65,13 +66,13 @@ class TrainConfig(BaseModel):
     device: str = "auto"
 
     def digest(self) -> str:
-        """Twelve hexadecimal digits of all that decides how a seed's curve goes: all but `BESIDE`, defaults too."""
+        """Return twelve hexadecimal digits of all values that affect a seed's curve, defaults included."""
         values = self.model_dump(mode="json", exclude=set(BESIDE))
         return digest_of({**values, "learner": {**DEFAULTS[self.algorithm], **self.learner}})
 
     @property
     def legs(self) -> int:
-        """How many evaluations a seed has."""
+        """Number of evaluations per seed."""
         return self.steps // self.evaluate_every
 
 
@@ -79,10 +80,14 @@ TRAIN_KEYS = tuple(TrainConfig.model_fields)
 
 
 def load_training(path: str | Path, overrides: list[str] | None = None) -> TrainConfig:
-    """A training config with `key=value` changes, checked.
+    """Load and check a training config with `key=value` changes.
+
+    Args:
+        path: training config file.
+        overrides: changes, each `key=value`.
 
     Raises:
-        BadConfig: naming the file, or the command line, and the key, and what is allowed.
+        BadConfig: names the file, or the command line, and the key, and the allowed values.
     """
     changes = overrides or []
     changed = {text.partition("=")[0].split(".")[0] for text in changes}

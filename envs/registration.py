@@ -1,4 +1,4 @@
-"""The ids; registering imports neither MuJoCo nor robosuite."""
+"""Environment ids and their registration; registering imports neither MuJoCo nor robosuite."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import gymnasium as gym
 
 
 class Id(NamedTuple):
-    """An environment.
+    """Registration data of an environment.
 
     Attributes:
-        entry_point: its class.
-        seconds: time limit.
-        frequency: of actions [Hz] by default.
+        entry_point: import path of its class.
+        seconds: time limit [s].
+        frequency: default action frequency [Hz].
     """
 
     entry_point: str
@@ -22,7 +22,7 @@ class Id(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """The time limit in actions."""
+        """Time limit in actions."""
         return round(self.seconds * self.frequency)
 
 
@@ -36,11 +36,11 @@ IDS = {
     "onedemo/TiltPour-v0": Id("onedemo.envs.pour.tilt_pour_env:TiltPourEnv", 7.5, 20),
     "onedemo/InsertOne-v0": Id("onedemo.envs.shelve.insert_one_env:InsertOneEnv", 7.5, 20),
 }
-"""The last four are single motions of the others, for those who train."""
+"""Environments by id; the last four are single motions of the other tasks, meant for training."""
 
 
 def register_all() -> None:
-    """Make the ids known to Gymnasium; doing it twice does no harm."""
+    """Register the ids with Gymnasium; repeated calls do no harm."""
     for name, kind in IDS.items():
         if name not in gym.registry:
             gym.register(name, entry_point=kind.entry_point, max_episode_steps=kind.steps)

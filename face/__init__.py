@@ -1,7 +1,45 @@
-"""One demonstration in, a robot policy out."""
+"""One demonstration in, a robot policy out.
+
+The packages: `onedemo.planner` (demonstrations, plans, control, safety; needs no simulator), `onedemo.envs` (Gymnasium
+tasks; importing registers the ids), `onedemo.baselines` (policies), `onedemo.configs` (settings as data).
+"""
 
 from __future__ import annotations
 
-from importlib.metadata import version
+from typing import TYPE_CHECKING
 
-__version__ = version("onedemo")
+from . import former_paths
+from .planner.lazy_names import lazy_names
+
+if TYPE_CHECKING:
+    from .baselines.factory import make_policy as make_policy
+    from .configs.demonstrations import load_demonstration as load_demonstration
+    from .planner.errors import OneDemoError as OneDemoError
+
+__all__ = [
+    "OneDemoError",
+    "__version__",
+    "load_demonstration",
+    "make_policy",
+]
+
+if not TYPE_CHECKING:  # a type checker would take any name for known
+    __getattr__, __dir__ = lazy_names(
+        __name__,
+        {
+            ".baselines.factory": ("make_policy",),
+            ".configs.demonstrations": ("load_demonstration",),
+            ".planner.errors": ("OneDemoError",),
+        },
+    )
+
+former_paths.keep()
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("onedemo")
+
+
+__version__ = _version()

@@ -1,4 +1,7 @@
-"""Every error of the project: one line for the reader, the offending data for the caller."""
+"""Errors of the planner, and the root of all errors: one line for the reader, the offending data for the caller.
+
+Other packages have errors of their own below the same root: `configs.errors`, `envs.errors`, `baselines.errors`.
+"""
 
 from __future__ import annotations
 
@@ -48,22 +51,6 @@ class BadDemonstration(OneDemoError, ValueError):
         super().__init__(f"{path or 'demonstration'}: {key}: {reason}")
 
 
-class BadActor(OneDemoError, ValueError):
-    """A learned policy's file cannot be used, or is of another method, task, robot or control."""
-
-    def __init__(self, path: str | Path, key: str, reason: str):
-        self.path, self.key, self.reason = path, key, reason
-        super().__init__(f"{path}: {key}: {reason}")
-
-
-class BadConfig(OneDemoError, ValueError):
-    """A configuration file or an override on the command line cannot be used."""
-
-    def __init__(self, source: str | Path, key: str, reason: str):
-        self.source, self.key, self.reason = source, key, reason
-        super().__init__(f"{source}: {key}: {reason}" if key else f"{source}: {reason}")
-
-
 class BadModel(OneDemoError, ValueError):
     """A robot model (URDF, MJCF, compiled) has no such arm, or holds absurd numbers."""
 
@@ -96,44 +83,9 @@ class BadOption(OneDemoError, ValueError):
         super().__init__(f"option {option!r}: {reason}")
 
 
-class NoRoom(BadOption):
-    """None of the starts that were drawn has room for the obstacles."""
-
-    def __init__(self, kind: object):
-        self.kind = kind
-        super().__init__("obstacles", f"no room for {kind!r} obstacles beside this start")
-
-
-class BadAction(OneDemoError, ValueError):
-    """An action has the wrong shape or is not finite."""
-
-    def __init__(self, reason: str):
-        self.reason = reason
-        super().__init__(f"action: {reason}")
-
-
 class PlanFailed(OneDemoError):
     """No plan was found; `reason` says why in the words of the failure taxonomy."""
 
     def __init__(self, reason: str, detail: str):
         self.reason, self.detail = reason, detail
         super().__init__(f"{reason}: {detail}")
-
-
-class MissingExtra(OneDemoError, ImportError):
-    """An optional library is not installed."""
-
-    def __init__(self, library: str, extra: str, detail: str):
-        self.library, self.extra, self.detail = library, extra, detail
-        super().__init__(f"{library} is needed ({detail}): pip install 'onedemo[{extra}]'")
-
-
-class RenderingUnavailable(OneDemoError, RuntimeError):
-    """No OpenGL library can draw without a display."""
-
-    def __init__(self, detail: str):
-        self.detail = detail
-        super().__init__(
-            f"no picture can be drawn ({detail}); install one of: apt install libegl1 libegl-mesa0 "
-            "libgl1-mesa-dri, or apt install libosmesa6"
-        )

@@ -1,9 +1,9 @@
-"""The compiler of the numeric kernels.
+"""Compilation of the numeric kernels.
 
-numba's disk cache does not notice a change in a function that is imported from another file. So the kernels of a
-file are cached in a folder named after the content of that file and of all project files that it imports, directly
-or not: an edit starts a fresh cache for what depends on it and for nothing else, and an installation in a read-only
-folder is compiled once per user instead of once per process.
+numba's disk cache ignores changes in functions imported from another file. So the kernels of a file are cached in a
+folder named after the content of that file and of all project files that it imports, directly or not: an edit starts
+a fresh cache only for the dependent files, and an installation in a read-only folder is compiled once per user
+instead of once per process.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from typing import Any
 import numba
 
 config: Any = import_module("numba.core.config")
-# the kernels are scalar code: looking for vectors in it takes a fifth of the time to compile and gains nothing
+# the kernels are scalar code: vectorization takes a fifth of the compile time and gains nothing
 config.LOOP_VECTORIZE = config.SLP_VECTORIZE = 0
 
 
 @cache
 def _imported(source: Path) -> frozenset[Path]:
-    """Project files that a file imports, wherever the import stands."""
+    """Return the project files that a file imports, anywhere in the file."""
     nodes = _relative_imports(source)
     return frozenset(file for node in nodes for alias in node.names for file in _files_of(source, node, alias.name))
 
@@ -38,14 +38,14 @@ def _relative_imports(source: Path) -> list[ast.ImportFrom]:
 
 
 def _files_of(source: Path, node: ast.ImportFrom, name: str) -> Iterator[Path]:
-    """The file of a module, or of the module in a package that a name is or comes from."""
+    """Yield the file of an imported module, or of the module in a package that an imported name comes from."""
     base = source.parents[node.level - 1].joinpath(*node.module.split(".") if node.module else ())
     package = base / "__init__.py"
     for file in (base.with_suffix(".py"), base / f"{name}.py"):
         if file.is_file():
             yield file
             return
-    if package.is_file():  # a public face: only what it takes the name from
+    if package.is_file():  # a package interface: only the module it imports the name from
         for inner_node in _relative_imports(package):
             if name in [alias.name for alias in inner_node.names]:
                 yield from _files_of(package, inner_node, name)
@@ -53,7 +53,7 @@ def _files_of(source: Path, node: ast.ImportFrom, name: str) -> Iterator[Path]:
 
 @cache
 def content_digest(source: Path) -> str:
-    """Digest of a file and of all project files that it imports, directly or not."""
+    """Return the digest of a file and of all project files that it imports, directly or not."""
     seen, todo = set(), [source]
     while todo:
         file = todo.pop()
@@ -68,7 +68,7 @@ def content_digest(source: Path) -> str:
 
 @cache
 def cache_folder(source: Path) -> Path:
-    """Folder of a file's compiled kernels: `NUMBA_CACHE_DIR` if set, else one per user and content."""
+    """Return the folder of a file's compiled kernels: `NUMBA_CACHE_DIR` if set, else one per user and content."""
     if config.CACHE_DIR:
         return Path(config.CACHE_DIR)
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -84,25 +84,25 @@ def cache_folder(source: Path) -> Path:
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of floats, tuples and float64 arrays; exact IEEE order, cached on disk.
 
-    The interpreter is let go meanwhile, so that threads run side by side.
+    A kernel releases the GIL, so that threads run in parallel.
     """
     return _compiled(function, {})
 
 
 def inner(function: Callable[..., Any]) -> Any:
-    """Compile a function that only kernels call: without an entry for Python, which takes a third less time."""
+    """Compile a function called by kernels only: without an entry for Python, saving a third of the compile time."""
     return _compiled(function, {"no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a short function into every kernel that calls it: handing arrays to a call costs more than it does."""
+    """Compile a short function into every kernel that calls it: passing arrays costs more than the function."""
     return _compiled(function, {"forceinline": True})
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     before = config.CACHE_DIR
-    # nothing is allocated in a kernel, so references to arrays need not be counted: it is done atomically, at every
-    # call that is inlined, and took as long as a distance does. A kernel that allocates does not compile
+    # nothing is allocated in a kernel, so references to arrays need not be counted: counting is atomic, happens at
+    # every inlined call, and took as long as a distance query. A kernel that allocates does not compile
     options["_nrt"] = False
     config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))
     try:

@@ -1,4 +1,4 @@
-"""JSON from files that nobody vouches for: what is not exactly as expected is refused by the name of its key."""
+"""Strict parsing of untrusted JSON: any deviation is refused, and the error names its key."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .errors import OneDemoError
 
 
 class Refused(OneDemoError, ValueError):
-    """An entry of a JSON file is not as expected."""
+    """An entry of a JSON file is invalid."""
 
     def __init__(self, key: str, reason: str):
         self.key, self.reason = key, reason
@@ -21,7 +21,15 @@ class Refused(OneDemoError, ValueError):
 
 
 def parsed(path: Path, max_bytes: int) -> Any:
-    """Content of a JSON file (UTF-8): no NaN, no infinity, no key twice, nothing larger than announced."""
+    """Parse a JSON file (UTF-8); NaN, infinity and duplicate keys are refused.
+
+    Args:
+        path: of the file.
+        max_bytes: largest accepted size of the file [bytes].
+
+    Raises:
+        Refused: the file is missing, too large or not valid JSON.
+    """
     if not path.is_file():
         raise Refused("file", "does not exist")
     try:
@@ -52,7 +60,16 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def table_of(key: str, value: Any, expected: tuple[str, ...]) -> dict[str, Any]:
-    """A table with exactly these keys."""
+    """Check that a value is a table with exactly the expected keys.
+
+    Args:
+        key: of the value, for messages; "" for the whole file.
+        value: the parsed value.
+        expected: the keys.
+
+    Raises:
+        Refused: no table, a missing or an unknown key.
+    """
     if not isinstance(value, dict):
         raise Refused(key or "file", "is not a table")
     for name in expected:
@@ -65,26 +82,58 @@ def table_of(key: str, value: Any, expected: tuple[str, ...]) -> dict[str, Any]:
 
 
 def list_of(key: str, value: Any) -> list[Any]:
-    """A list of anything."""
+    """Check that a value is a list.
+
+    Args:
+        key: of the value, for messages.
+        value: the parsed value.
+
+    Raises:
+        Refused: the value is not a list.
+    """
     if not isinstance(value, list):
         raise Refused(key, "is not a list")
     return value
 
 
 def text_of(key: str, value: Any) -> str:
-    """A text."""
+    """Check that a value is a string.
+
+    Args:
+        key: of the value, for messages.
+        value: the parsed value.
+
+    Raises:
+        Refused: the value is not a string.
+    """
     if not isinstance(value, str):
         raise Refused(key, f"is a {type(value).__name__}, not a text")
     return value
 
 
 def texts_of(key: str, value: Any) -> tuple[str, ...]:
-    """A list of texts."""
+    """Check that a value is a list of strings.
+
+    Args:
+        key: of the value, for messages.
+        value: the parsed value.
+
+    Raises:
+        Refused: the value is not a list of strings.
+    """
     return tuple(text_of(f"{key}[{k}]", item) for k, item in enumerate(list_of(key, value)))
 
 
 def number_of(key: str, value: Any) -> float:
-    """A finite number; true and false are none."""
+    """Check that a value is a finite number and return it as float.
+
+    Args:
+        key: of the value, for messages.
+        value: the parsed value; true and false are refused.
+
+    Raises:
+        Refused: the value is not a finite number.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise Refused(key, f"is a {type(value).__name__}, not a number")
     try:
@@ -97,12 +146,15 @@ def number_of(key: str, value: Any) -> float:
 
 
 def numbers_of(key: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Nested lists of finite numbers as an array.
+    """Convert nested lists of finite numbers to a float64 array.
 
     Args:
-        key: for messages.
+        key: of the value, for messages.
         value: the lists.
-        shape: expected; None stands for any length.
+        shape: required shape; None stands for any length.
+
+    Raises:
+        Refused: another shape, or an entry that is not a finite number.
     """
     array = np.array(_nested(key, value, shape), dtype=np.float64)
     return array if array.size else array.reshape([size or 0 for size in shape])

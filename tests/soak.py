@@ -27,13 +27,14 @@ from helpers.arms import panda, panda_urdf, random_arm
 from helpers.solids import KINDS, fcl_capsule, fcl_distance, fcl_obstacle, random_pose, random_shape
 
 from onedemo.planner import jit
+from onedemo.planner.collision.capsule_placement import place_capsules
 from onedemo.planner.collision.clearance import find_near, slack_at
-from onedemo.planner.collision.robot_arrays import HIGH, LOW, SETTINGS, SPEED, WORLD, place_capsules
+from onedemo.planner.collision.robot_arrays import ROW, SETTING
 from onedemo.planner.escape.tangent_plane import random_number
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle
 from onedemo.planner.robot.arm import Arm
-from onedemo.planner.robot.body import Body
+from onedemo.planner.robot.body import BODY, Body
 from onedemo.planner.robot.body_readers import body_from_urdf, resting_pairs
 from onedemo.planner.safety import safety_layer as safety
 from onedemo.planner.safety.barrier import allowed_speeds, constrain, scale_to_speeds
@@ -55,11 +56,11 @@ def command(eye, q, mode, state, keep, wanted):
     for i in range(n):
         x = 2.0 * random_number(state) - 1.0
         if mode == RANDOM:
-            wanted[i] = 3.0 * x * eye[SPEED, i]
+            wanted[i] = 3.0 * x * eye[ROW.speed, i]
         elif mode == BANG:
-            wanted[i] = keep[i] * eye[SPEED, i]
+            wanted[i] = keep[i] * eye[ROW.speed, i]
         elif mode == CORNER:
-            wanted[i] = 30.0 * ((eye[HIGH, i] if keep[i] > 0.0 else eye[LOW, i]) - q[i])
+            wanted[i] = 30.0 * ((eye[ROW.upper, i] if keep[i] > 0.0 else eye[ROW.lower, i]) - q[i])
         elif mode == ABSURD:
             wanted[i] = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300, x)[int(6.999 * random_number(state))]
     if mode in (STEEPEST, TOWARDS, GRAZE):
@@ -70,7 +71,7 @@ def command(eye, q, mode, state, keep, wanted):
             slope = (slack_at(eye, q, 0.0, 3.0) - here) / 1e-6
             q[i] = before
             if mode == STEEPEST:
-                wanted[i] = -10.0 * eye[SPEED, i] * (1.0 if slope > 0.0 else -1.0)
+                wanted[i] = -10.0 * eye[ROW.speed, i] * (1.0 if slope > 0.0 else -1.0)
             else:
                 wanted[i] = -100.0 * slope
                 if mode == GRAZE:
@@ -82,8 +83,8 @@ def stopped(eye, q, wanted, out, asked):
     n, most, least = len(q), 0.0, 0.0
     for i in range(n):
         asked[i] = wanted[i] if np.isfinite(wanted[i]) else 0.0
-    place_capsules(eye, q, WORLD)
-    find_near(eye, eye[SETTINGS, 0])
+    place_capsules(eye, q, ROW.placed)
+    find_near(eye, eye[ROW.settings, SETTING.shell])
     scale_to_speeds(eye, asked)
     constrain(eye, q, asked)
     for i in range(n):
@@ -129,9 +130,9 @@ def drive(g, eye, starts, steps, dt, substeps, state, tally, log):
         beyond = False
         for i in range(n):
             # not `>`: NaN counts
-            if not (eye[LOW, i] - 1e-12 <= p[i] <= eye[HIGH, i] + 1e-12):
+            if not (eye[ROW.lower, i] - 1e-12 <= p[i] <= eye[ROW.upper, i] + 1e-12):
                 beyond = True
-            if not abs(out[i]) <= eye[SPEED, i] * (1.0 + 1e-12):
+            if not abs(out[i]) <= eye[ROW.speed, i] * (1.0 + 1e-12):
                 beyond = True
         tally[STEPS] += 1
         tally[STATUS + status] += 1
@@ -139,7 +140,7 @@ def drive(g, eye, starts, steps, dt, substeps, state, tally, log):
         tally[TOO_CLOSE] += 1 if not worst >= -SLACK else 0
         tally[WORST] = min(tally[WORST], worst)
         tally[AT_SURFACE] += 1 if room < 1e-3 else 0
-        if room > eye[SETTINGS, 11]:
+        if room > eye[ROW.settings, SETTING.width]:
             tally[ROOMY] += 1
             if stopped(eye, q, wanted, out, asked):
                 tally[STOPPED] += 1
@@ -177,7 +178,7 @@ def panda_body() -> Body:
 @cache
 def panda_pairs() -> tuple[tuple[int, int], ...]:
     """Pairs of the Panda that are not always close: parts that are at least four joints apart."""
-    frames, resting = panda_body().rows[:, 0], set(resting_pairs(panda(), panda_body()))
+    frames, resting = panda_body().rows[:, BODY.frame], set(resting_pairs(panda(), panda_body()))
     some = [(i, j) for j in range(len(frames)) for i in range(j) if frames[j] - frames[i] >= 4]
     return tuple(pair for pair in some if pair not in resting)
 
@@ -201,7 +202,7 @@ def random_robot(rng: np.random.Generator, kind: str) -> Robot:
     speed = rng.choice([1.0, 2.0, 20.0], arm.dof)
     arm = Arm(arm.name, arm.joint_names, arm.chain, arm.lower, arm.upper, speed)
     body = random_body(arm, rng)
-    frames = body.rows[:, 0]
+    frames = body.rows[:, BODY.frame]
     some = [(i, j) for i in range(len(body)) for j in range(i + 1, len(body)) if abs(frames[i] - frames[j]) > 1]
     return Robot([arm], [body], [pair for pair in some if rng.uniform() < 0.5])
 
@@ -248,9 +249,9 @@ def random_scene(seed: int, kind: str = "", tries: int = 300) -> Scene:
         obstacles, dt = random_obstacles(rng), float(rng.choice([0.005, 0.01, 0.05]))
         layer = SafetyLayer(robot.arms, robot.bodies, obstacles, dt, settings=SETTINGS_USED, pairs=robot.pairs)
         # the distance to keep, for the tally
-        layer.work[SETTINGS, 11] = SETTINGS_USED.distance
+        layer.work[ROW.settings, SETTING.width] = SETTINGS_USED.distance
         n = layer.joints
-        low, high = layer.work[LOW, :n], layer.work[HIGH, :n]
+        low, high = layer.work[ROW.lower, :n], layer.work[ROW.upper, :n]
         places = (rng.uniform(low, high) for _ in range(tries))
         starts = [q for q in places if slack_at(layer.work, q, 0.0, 1.0) > 1e-6][:20]
         if starts:

@@ -16,16 +16,25 @@ LOWER = {
     "face": {"planner", "envs", "baselines", "configs"},
 }
 ORDER = {
-    "planner": """errors jit strict_json geometry robot collision control imitation log escape safety judge planning
-        reactive""",
-    "envs": "registration scene simulation core stack pour shelve",
-    "configs": """shipped_files strict_yaml dotted_keys dataclass_settings run_config learner_defaults grid
-        learner_values train_config plan_scene_schema plan_scene""",
-    "baselines": """policy extras warm_up key_poses recording motion programs own_policy program_policy safe_actions
-        screw_policy learning factory paths_only""",
-    "bench": """console atomic_files statistics provenance interruption task_table method_table demonstrations drawing
-        document metrics plan workers episodes report geometric run task_pages reproduce train curves perf cli""",
-    "face": "",
+    "planner": """
+        errors lazy_names ranges jit columns strict_json geometry robot collision control imitation log escape
+        safety judge planning reactive
+    """,
+    "envs": "errors registration scene simulation core stack pour shelve",
+    "configs": """
+        errors shipped_files demonstrations strict_yaml dotted_keys dataclass_settings run_config
+        learner_defaults grid learner_values train_config plan_scene_schema plan_scene
+    """,
+    "baselines": """
+        errors policy extras warm_up key_poses recording motion programs own_policy program_policy
+        safe_actions screw_policy learning factory paths_only
+    """,
+    "bench": """
+        console atomic_files statistics provenance interruption task_table method_table demonstrations
+        drawing document metrics plan workers episodes report geometric run task_pages reproduce train
+        curves perf cli
+    """,
+    "face": "former_paths",
 }
 """Sub-packages, and files that lie in none, from the lowest up: each imports only from those before it."""
 ENVS_MAY_USE = {"planner.errors", "planner.jit", "planner.geometry", "planner.robot"}
@@ -43,6 +52,8 @@ JUDGE_SHARES = {
     "planner.errors",
     "planner.jit",
     "planner.strict_json",
+    "planner.ranges",
+    "planner.columns",
     "planner.geometry",
     "planner.robot",
     "planner.log",

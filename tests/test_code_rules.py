@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 import pytest
 from helpers.import_graph import PACKAGES, ROOT, SOURCES, external_imports_of, tree_of
@@ -72,3 +73,37 @@ def test_no_path_of_a_machine_stands_in_the_source(folder):
             text = path.read_text(encoding="utf-8")
             for word in ("/" + "home/", "/" + "root/", "/" + "work/", "/" + "Users/"):
                 assert word not in text, f"{path}: {word}"
+
+
+def public_functions(path):
+    """Public functions, and methods of public classes, with their parameters."""
+    for node in ast.walk(tree_of(path)):
+        inside = isinstance(node, ast.Module) or (isinstance(node, ast.ClassDef) and not node.name.startswith("_"))
+        for child in node.body if inside else ():
+            if isinstance(child, ast.FunctionDef) and not child.name.startswith("_"):
+                every = [*child.args.posonlyargs, *child.args.args, *child.args.kwonlyargs]
+                yield child, [each.arg for each in every if each.arg not in ("self", "cls")]
+
+
+@each_source
+def test_public_functions_of_two_or_more_parameters_explain_each(path):
+    """Commands aside, whose docstring is the text of --help, and methods of an interface explained elsewhere."""
+    for node, names in public_functions(path):
+        text = ast.get_docstring(node) or ""
+        is_command = any("command" in ast.unparse(each) for each in node.decorator_list)
+        if len(names) >= 2 and not text.startswith("See ") and not is_command:
+            explained = set(re.findall(r"^ {4}(\w+): ", text.partition("Args:")[2], re.MULTILINE))
+            assert set(names) <= explained, f"{node.name}: {sorted(set(names) - explained)}"
+
+
+OLD_TICS = ("that is none", "of which there", "goes on", "gets on", "has come to its end", "that is well")
+
+
+@each_source
+def test_first_lines_are_sentences(path):
+    """An imperative or a noun phrase: not a relative clause without its noun."""
+    nodes = [node for node in ast.walk(tree_of(path)) if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)]
+    for node in nodes:
+        first = (ast.get_docstring(node) or "").partition("\n")[0]
+        assert not re.match(r"(What|That|Whose|Which|Who|It|The same|How|Of|Whether) ", first), first
+        assert not [tic for tic in OLD_TICS if tic in first], first

@@ -21,7 +21,7 @@ from onedemo.baselines.factory import make_policy
 from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.configs.strict_yaml import load_mapping
 from onedemo.planner.errors import PlanFailed
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planning_scene import PlanningScene, SceneTemplate
 from onedemo.planner.safety.safety_layer import SafetySettings
@@ -33,9 +33,8 @@ LEGS_PER_BLOCK = 2
 
 def touches(plan: Plan) -> bool:
     """True if the arm or what it holds touches an obstacle that nobody showed."""
-    asked = plan.request
-    strange = [each for each in asked.obstacles if each.name.startswith("obstacle")]
-    scene = PlanningScene(SceneTemplate(asked.arm, asked.body, SafetySettings(distance=0.0), plan.dt), strange, 0.0)
+    strange = [each for each in plan.request.obstacles if each.name.startswith("obstacle")]
+    scene = PlanningScene(SceneTemplate(plan.arm, plan.body, SafetySettings(distance=0.0), plan.dt), strange, 0.0)
     return bool(strange) and min(scene.slack(q) for q in plan.joints[::2]) < 0.0
 
 
@@ -53,7 +52,7 @@ def legs_of(policy: Any, observation: Any) -> list[Plan]:
 
 def tried(env: Any, method: str, settings: dict[str, Any], seeds: range) -> tuple[float, float, float, float]:
     """Shares of legs that arrive, that arrive clear; screw length over the demonstration's; seconds per leg."""
-    demonstration = load_demonstration(shipped_demonstration("stack"))
+    demonstration = read_demonstration(shipped_demonstration("stack"))
     policy = make_policy(method, env.unwrapped.task, demonstration, settings)
     wanted, arrived, clear, lengths, begun = 0, 0, 0, [], time.perf_counter()
     for seed in seeds:

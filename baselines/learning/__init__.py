@@ -1,1 +1,1 @@
-"""Policies that were trained, and what trains them."""
+"""Learned policies, and the parts of their training that need no torch."""

@@ -1,4 +1,4 @@
-"""What has been learned: a network, the features it sees, and all that says where it may act."""
+"""Learned actors: a network, its features, and the conditions under which it may act."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
+from ...envs import TaskDescription
 from ...planner.errors import BadOption
 from ..policy import Observation
 from .feature_scaling import Normalization
@@ -18,24 +18,24 @@ from .features import Features
 from .network import Network
 
 PACKAGES = ("onedemo", "numpy", "gymnasium", "mujoco", "robosuite", "torch", "stable_baselines3", "sb3_contrib")
-"""Whose versions an actor remembers."""
+"""Packages whose versions an actor records."""
 TWIST = 6
 """Entries of a tcp twist."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingInfo:
-    """How an actor came about; for the reader and for reports, nothing depends on it.
+    """Origin of an actor, for readers and reports; nothing depends on it.
 
     Attributes:
-        algorithm: like "SAC".
-        steps: of the environment, demonstrations included.
-        seed: of the training.
-        demonstrations: how many it has seen.
-        success: share of the episodes in which it succeeded when it was done; None: not measured.
-        episodes: in how many that was measured.
-        seconds: real time.
-        settings: of the algorithm; numbers, texts, truth values or None.
+        algorithm: name like "SAC".
+        steps: environment steps, demonstrations included.
+        seed: seed of the training.
+        demonstrations: number of demonstrations seen.
+        success: share of successful episodes at the end; None: not measured.
+        episodes: number of episodes in that measurement.
+        seconds: real time [s].
+        settings: settings of the algorithm; numbers, texts, truth values or None.
     """
 
     algorithm: str
@@ -50,25 +50,25 @@ class TrainingInfo:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Actor:
-    """A learned policy without its algorithm.
+    """Learned policy without its algorithm.
 
     Attributes:
-        method: the policy's name, like "sac".
+        method: name of the policy, like "sac".
         task: name of the task it was trained on.
         robot: robosuite's name of the robot it was trained with.
-        control_mode: what its actions say: "joint_velocity" or "ee_twist".
-        frequency: of its actions [Hz].
-        features: what it sees.
-        normalization: of the features.
-        network: from scaled features to an action in [-1, 1].
-        residual_scale: per entry of the action, how much of the network's is added to another policy's, times the
-            speed of its fastest joint, see `residual.corrected`; (): the network's action is the action.
-        config_hash: of the settings of its training, "" if there are none.
-        versions: of the packages it was trained with, by name.
+        control_mode: meaning of its actions: "joint_velocity" or "ee_twist".
+        frequency: rate of its actions [Hz].
+        features: features of the observation it sees.
+        normalization: scaling of the features.
+        network: network from scaled features to an action in [-1, 1].
+        residual_scale: (m,) weights of the network's action where it is added to another policy's action, relative to
+            the speed of that policy's fastest joint; see `residual_policy.corrected`. (): the network acts alone.
+        config_hash: digest of its training's config, or "".
+        versions: versions of the packages it was trained with, by name.
         training: see `TrainingInfo`.
 
     Raises:
-        BadOption: parts that do not fit together.
+        BadOption: the parts do not fit together.
     """
 
     method: str
@@ -96,15 +96,22 @@ class Actor:
 
     @property
     def actions(self) -> int:
-        """How many entries an action has."""
+        """Number of entries of an action."""
         return self.network.sizes[-1]
 
     def __call__(self, observation: Observation) -> np.ndarray:
-        """The action (actions,) float32, in [-1, 1], of one observation."""
+        """Return the action (actions,) float32, in [-1, 1], for one observation."""
         return self.network(self.normalization(self.features(observation)))
 
     def misfit(self, method: str, task: TaskDescription) -> tuple[str, str] | None:
-        """Of what is known of a task beforehand, the first thing this actor is not made for: its key and a reason."""
+        """Return the first property of a task that this actor was not made for, as key and reason, or None.
+
+        Only properties known before the first observation are checked; see `unseen` for the others.
+
+        Args:
+            method: name of the policy that is to use the actor.
+            task: the task.
+        """
         entries = len(task.arms) * ((TWIST if task.control_mode == "ee_twist" else task.arms[0].dof) + 1)
         for key, own, wanted, unit, argument in (
             ("method", self.method, method, "", ""),
@@ -122,11 +129,11 @@ class Actor:
         return self.unseen(known, partly=True)
 
     def unseen(self, shapes: Mapping[str, tuple[int, ...]], *, partly: bool = False) -> tuple[str, str] | None:
-        """The first entry of the observation that is missing or of another shape: its key and a reason.
+        """Return the first observation entry that is missing or has another shape, as key and reason, or None.
 
         Args:
-            shapes: of the entries that there are.
-            partly: what is missing may be there all the same.
+            shapes: shapes of the known entries, by name.
+            partly: `shapes` is incomplete: accept missing entries.
         """
         for key, shape in self.features.shapes:
             if key not in shapes and not partly:
@@ -137,12 +144,12 @@ class Actor:
 
 
 def frequency_of(task: TaskDescription) -> int:
-    """Actions per second."""
+    """Return the number of actions per second."""
     return round(1.0 / task.control_dt)
 
 
 def versions_now() -> dict[str, str]:
-    """The versions of Python and of those of `PACKAGES` that are installed."""
+    """Return the versions of Python and of the installed packages of `PACKAGES`."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -155,14 +162,14 @@ def versions_now() -> dict[str, str]:
 def actor_for(
     task: TaskDescription, network: Network, features: Features, normalization: Normalization, **more: Any
 ) -> Actor:
-    """An actor for a task, with the versions of now.
+    """Return an actor for a task, with the current package versions.
 
     Args:
         task: `env.unwrapped.task`.
         network: see `Actor`.
         features: see `Actor`.
         normalization: see `Actor`.
-        more: `method`, and what else of `Actor` is known.
+        more: `method`, and further attributes of `Actor`.
     """
     return Actor(
         task=task.name,

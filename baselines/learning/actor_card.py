@@ -1,4 +1,4 @@
-"""All of an actor but its weights, as a table that JSON can hold; read strictly. The keys: docs/learning.md."""
+"""Metadata of an actor: everything except its weights, as a JSON table, read strictly. Keys: docs/learning.md."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ KEYS = (
 
 
 class Card(NamedTuple):
-    """A table that has been read.
+    """Table that has been read.
 
     Attributes:
-        actor: the arguments of `Actor`, but for its network.
-        sizes: of the network's layers, what goes in first.
+        actor: arguments of `Actor`, except for its network.
+        sizes: sizes of the network's layers, its input first.
         activation: see `Network`.
         output: see `Network`.
-        bytes: of the file of weights.
-        sha256: of the file of weights.
+        bytes: size of the weights file.
+        sha256: SHA-256 of the weights file.
     """
 
     actor: dict[str, Any]
@@ -42,7 +42,13 @@ class Card(NamedTuple):
 
 
 def card_of(actor: Actor, size: int, digest: str) -> dict[str, Any]:
-    """The table of an actor whose file of weights has a size in bytes and a SHA-256."""
+    """Return the table of an actor.
+
+    Args:
+        actor: the actor.
+        size: size of its weights file in bytes.
+        digest: SHA-256 of its weights file.
+    """
     normalization, network = actor.normalization, actor.network
     return {
         "format_version": FORMAT_VERSION,
@@ -69,11 +75,11 @@ def card_of(actor: Actor, size: int, digest: str) -> dict[str, Any]:
 
 
 def read_card(value: Any) -> Card:
-    """What a table says.
+    """Read the table of an actor.
 
     Raises:
-        Refused: naming the first key that is not as expected.
-        OneDemoError: features or their scales that no actor can have.
+        Refused: the first unexpected key.
+        OneDemoError: features or scales that no actor can have.
     """
     if isinstance(value, dict) and value.get("format_version", FORMAT_VERSION) != FORMAT_VERSION:
         raise Refused("format_version", f"is {value['format_version']!r}; this program reads {FORMAT_VERSION}")
@@ -96,7 +102,7 @@ def read_card(value: Any) -> Card:
 
 
 def one_line(text: str) -> str:
-    """A text from a file as one printable line."""
+    """Return an untrusted text as one printable line of limited length."""
     shown = "".join(sign if sign.isprintable() else " " for sign in text[: MAX_TEXT + 1])
     return shown if len(shown) <= MAX_TEXT else f"{shown[:MAX_TEXT]}…"
 
@@ -111,7 +117,7 @@ def _features(card: Mapping[str, Any]) -> tuple[Features, Normalization]:
     if spare := sorted({key for key, _ in shapes} - {key for key, _ in features.shapes}):
         raise Refused(f"observation.{spare[0]}", "is in none of features.blocks")
     names = texts_of("features.names", table["names"])
-    # before they are made, for the shapes may announce any number of them
+    # checked before `features.names` is built, since untrusted shapes may claim any number of entries
     if len(names) != features.size:
         raise Refused("features.names", f"has {len(names)} entries; the blocks have {features.size}")
     for k, (name, expected) in enumerate(zip(names, features.names, strict=True)):
@@ -161,17 +167,18 @@ def _training(value: Any) -> TrainingInfo:
 
 
 def _table(key: str, tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """A table with any keys."""
+    """Return a table with arbitrary keys."""
     if not isinstance(tables[key], dict):
         raise Refused(f"{prefix}{key}", "is not a table")
     return tables[key]
 
 
 def _whole(key: str, value: Any, least: int) -> int:
-    """A whole number."""
+    """Return a whole number."""
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MAX_NUMBER:
         raise Refused(key, f"is {one_line(repr(value))}, not a whole number from {least} on")
     return value
 
 
 METHOD = "residual"
+"""Name of the method whose actors correct another policy."""

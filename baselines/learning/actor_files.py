@@ -1,7 +1,7 @@
 """Actors as files: NAME.json, and NAME.safetensors for the weights. Reading never runs code.
 
-The .json says how large the weights are and what their SHA-256 is, so that a cut, changed or foreign file is refused
-before it is read as weights; see docs/learning.md.
+The .json states the size and the SHA-256 of the weights, so that a truncated, modified or foreign file is refused
+before it is parsed as weights; see docs/learning.md.
 """
 
 from __future__ import annotations
@@ -13,35 +13,36 @@ from pathlib import Path
 
 import numpy as np
 
-from ...planner.errors import BadActor, OneDemoError
+from ...planner.errors import OneDemoError
 from ...planner.strict_json import Refused, parsed
+from ..errors import BadActor
 from .actor import Actor
 from .actor_card import Card, card_of, one_line, read_card
 from .network import Network
 
 MAX_BYTES, MAX_CARD_BYTES, MAX_HEADER_BYTES = 64 * 2**20, 2**20, 64 * 2**10
-"""Of the weights, of the .json, of the header of the weights."""
+"""Size limits of the weights, of the .json, and of the header of the weights."""
 CARD, WEIGHTS = ".json", ".safetensors"
 FOREIGN = {
     b"PK\x03\x04": "is a zip archive, as Stable-Baselines3 saves models: it holds pickles, and reading one may run "
     "anything. Only if you trust its author: allow_pickle=true (needs 'onedemo[rl]'); better, have it exported",
     b"\x80": "is a pickle, which may run anything when it is read; an actor is NAME.json beside NAME.safetensors",
 }
-"""First bytes of files that are often taken for an actor, and what is said of them."""
+"""First bytes of files often mistaken for an actor, and the reasons given for refusing them."""
 
 
 def save_actor(actor: Actor, path: str | Path) -> Path:
-    """Write an actor; each file appears when it is complete, the .json last.
+    """Write an actor; each file appears only when it is complete, the .json last.
 
     Args:
-        actor: it.
-        path: NAME, or NAME.json; or an existing folder, in which NAME is "actor".
+        actor: the actor.
+        path: NAME or NAME.json; or an existing folder, in which NAME is "actor".
 
     Returns:
-        The .json.
+        Path of the .json.
 
     Raises:
-        BadActor: it is too large, or cannot be written there.
+        BadActor: the actor is too large, or cannot be written there.
     """
     from safetensors.numpy import save
 
@@ -73,7 +74,7 @@ def load_actor(path: str | Path) -> Actor:
     """Read an actor.
 
     Args:
-        path: NAME, NAME.json or NAME.safetensors; or a folder with "actor" in it.
+        path: NAME, NAME.json or NAME.safetensors; or a folder that contains "actor".
 
     Raises:
         BadActor: a file or one of its entries cannot be used; the message names both.
@@ -82,7 +83,7 @@ def load_actor(path: str | Path) -> Actor:
     stem = _stem(path)
     card, weights = _beside(stem, CARD), _beside(stem, WEIGHTS)
     for file in (path, card):
-        # the length of a header of weights may begin as a pickle does
+        # weights are not checked: the length of their header may begin like a pickle
         if file.suffix != WEIGHTS and (reason := foreign(file)):
             raise BadActor(file, "file", reason)
     if path.is_file() and path not in (card, weights):
@@ -100,12 +101,12 @@ def load_actor(path: str | Path) -> Actor:
 
 
 def card_path(path: Path) -> Path:
-    """The .json of an actor, given in any of the ways of `load_actor`."""
+    """Return the path of an actor's .json, for any path that `load_actor` accepts."""
     return _beside(_stem(path), CARD)
 
 
 def foreign(path: Path) -> str:
-    """Why a file that is often taken for an actor is none; "" if it may be one, or is not there."""
+    """Return why a file often mistaken for an actor is refused; "" if it may be an actor, or does not exist."""
     try:
         if not path.is_file():
             return ""
@@ -131,7 +132,7 @@ def _names(layer: int) -> tuple[str, str]:
 
 
 def _layers(path: Path, card: Card) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-    """Weights and biases per layer, once size and digest of the file are what the .json says."""
+    """Return weights and biases per layer, after checking size and digest of the file against the .json."""
     shapes, sizes = {}, card.sizes
     for k in range(len(sizes) - 1):
         shapes.update(zip(_names(k), ((sizes[k + 1], sizes[k]), (sizes[k + 1],)), strict=True))
@@ -159,7 +160,7 @@ def _layers(path: Path, card: Card) -> tuple[tuple[np.ndarray, ...], tuple[np.nd
 
 
 def _content(path: Path, size: int) -> bytes:
-    """The bytes of a file of that size."""
+    """Return the bytes of a file that must have the given size."""
     try:
         found = path.stat().st_size if path.is_file() else -1
         if found == size:

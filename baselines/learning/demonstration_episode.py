@@ -1,7 +1,7 @@
-"""The ONE demonstration as one episode in an environment's own actions: what a learner may be shown.
+"""Playback of the ONE demonstration as an episode in an environment's own actions, for learners.
 
-Not in the paper: there, nothing is learned from it. A plain proportional law follows the demonstrated path of the tcp;
-there is no planner, and nothing is avoided.
+Not in the paper: there, nothing is learned from it. A plain proportional law follows the demonstrated path of the tcp,
+without a planner and without avoiding anything.
 """
 
 from __future__ import annotations
@@ -13,37 +13,40 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
+from ...envs import TaskDescription
 from ...envs.simulation.twist_control import MAX_ANGULAR, MAX_LINEAR
-from ...planner.control.controller import Controller, ControllerSettings
+from ...planner import Controller, ControllerSettings, Demonstration, Pose, PosePath, guide_index, imitated_path
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
-from ...planner.imitation.demonstration import GRIPPER_ACTIONS, Demonstration
-from ...planner.imitation.tsia import guide_index, imitated_path
+from ...planner.geometry.pose import METERS_PER_RADIAN
+from ...planner.imitation.demonstration import GRIPPER_ACTIONS
+from ...planner.ranges import check_choice, check_ranges
 from ..policy import Observation
 
 GRIPS = {"close": 1.0, "open": -1.0}
-"""The gripper's entry of an action."""
+"""Gripper entry of an action."""
 LEVEL = "L0"
+"""Level of the starts at which the demonstration is played."""
 Goal = Callable[[Observation], Pose]
-"""Where the tcp must be at the end of the path, seen the first observation."""
+"""Function from the first observation to the tcp's pose at the end of the path."""
 
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """How the path is followed, and what comes after it.
+    """Parameters of following the path, and of the steps after it.
+
+    Path lengths are weighted, see `METERS_PER_RADIAN`.
 
     Attributes:
-        begin: share of the path, by screw length, at which it is joined: the tcp goes straight there.
-        gain: of the law [1/s].
-        ahead: screw length [m] by which the pose that is aimed at is ahead; with the gain it gives the speed.
-        tolerance: screw length [m] to the end at which it is reached.
-        patience: seconds without getting nearer after which the end counts as reached.
-        hold: seconds of standing still at the end of the path.
-        ending: what the gripper does then: "close", "open", "none"; "": what the demonstration's does.
-        grip: seconds given to it.
-        withdraw: distance [m] by which the tool then goes back along its own axis.
-        rest: seconds of standing still at last, in which success may be judged.
+        begin: share of the path length at which the path is joined, straight from the start.
+        gain: gain of the law [1/s].
+        ahead: path length [m] between the tcp and the pose aimed at; with the gain it determines the speed.
+        tolerance: path length [m] to the end within which the end is reached.
+        patience: time [s] without progress after which the end counts as reached.
+        hold: time [s] of standing still at the end of the path.
+        ending: gripper action after that: "close", "open", "none"; "": the demonstrated action.
+        grip: time [s] for the gripper action.
+        withdraw: distance [m] by which the tool then retreats along its own axis.
+        rest: time [s] of standing still at the end, in which success may be judged.
     """
 
     begin: float = 0.0
@@ -58,28 +61,22 @@ class Playback:
     rest: float = 1.0
 
     def __post_init__(self):
-        for name in ("gain", "ahead", "tolerance", "patience"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
-        for name in ("hold", "grip", "withdraw", "rest"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise BadOption(name, f"{getattr(self, name)} is not a number >= 0")
-        if not 0.0 <= self.begin < 1.0:
-            raise BadOption("begin", f"{self.begin} is not in [0, 1)")
-        if self.ending not in ("", *GRIPPER_ACTIONS):
-            raise BadOption("ending", f"{self.ending!r} is not one of {', '.join(GRIPPER_ACTIONS)}")
+        check_ranges(self, "(0, inf)", "gain", "ahead", "tolerance", "patience")
+        check_ranges(self, "[0, inf)", "hold", "grip", "withdraw", "rest")
+        check_ranges(self, "[0, 1)", "begin")
+        check_choice("ending", self.ending, ("", *GRIPPER_ACTIONS))
 
 
 class Transitions(NamedTuple):
-    """An episode, step by step.
+    """Episode, step by step.
 
     Attributes:
-        observations: (n, ...) per entry.
+        observations: (n, ...) per entry, before each step.
         actions: (n, m), in [-1, 1].
-        rewards: (n,).
-        next_observations: (n, ...) per entry.
+        rewards: (n,) rewards.
+        next_observations: (n, ...) per entry, after each step.
         terminations: (n,) True where the episode ended.
-        success: what the simulator said at the end.
+        success: verdict of the simulator at the end.
     """
 
     observations: dict[str, np.ndarray]
@@ -99,19 +96,19 @@ def demo_episode(
     playback: Playback | None = None,
     seed: int = 0,
 ) -> Transitions:
-    """Play segments of the demonstration at the environment's nominal start, level L0.
+    """Play segments of the demonstration from the environment's nominal start, level L0.
 
     Args:
-        env: of ours, with one arm and a Dict as its observation, in either control mode; wrapped or not.
-        demonstration: it.
-        segments: names of those whose path is followed, one after the other.
-        goal: where the path is to end, it is moved there as a whole; None: the path is followed where it was shown.
-        playback: how.
-        seed: of the start.
+        env: environment of this project with one arm and a Dict observation, in either control mode; wrapped or not.
+        demonstration: the demonstration.
+        segments: names of the segments to follow, in order.
+        goal: pose to which the end of the path is moved, the path as a whole with it; None: the demonstrated path.
+        playback: parameters of the playback; None: the defaults.
+        seed: seed of the start.
 
     Raises:
         UnknownName: no such segment.
-        BadOption: an environment of two arms, or whose observation is another one.
+        BadOption: the environment has two arms, or another kind of observation.
     """
     task: TaskDescription = env.unwrapped.task
     if len(task.arms) != 1:
@@ -152,16 +149,16 @@ def demo_episode(
 
 
 def tcp_to_goal(goal: int = 0) -> Goal:
-    """The tcp at a goal."""
+    """Return the goal "tcp at goal number `goal`"."""
     return lambda observation: _pose(observation, "goal_pose", goal)
 
 
 def held_to_goal(index: int = 0, goal: int | None = None) -> Goal:
-    """The tcp where the object in the hand, held as at the first observation, is at its goal.
+    """Return the goal "held object at its goal", with the object held as in the first observation.
 
     Args:
-        index: of the object.
-        goal: index of the goal; None: the object's.
+        index: index of the object.
+        goal: index of the goal; None: the object's own.
     """
 
     def place(observation: Observation) -> Pose:
@@ -172,12 +169,12 @@ def held_to_goal(index: int = 0, goal: int | None = None) -> Goal:
 
 
 def as_shown(demonstration: Demonstration, segment: str, index: int) -> Goal:
-    """The tcp at the object as it was at the segment's reference when the segment ended.
+    """Return the goal "tcp at an object as demonstrated at the segment's reference".
 
     Args:
-        demonstration: it.
+        demonstration: the demonstration; the tcp pose is that at the end of the segment.
         segment: name of the segment.
-        index: of the object that stands for the reference.
+        index: index of the object that stands for the reference.
     """
     reference_from_tcp = (
         demonstration.segment(segment).reference_pose.inverse() @ (demonstration.segment_path(segment)[-1])
@@ -186,7 +183,13 @@ def as_shown(demonstration: Demonstration, segment: str, index: int) -> Goal:
 
 
 def twist_action(tcp: Pose, target: Pose, gain: float) -> np.ndarray:
-    """The first six entries of an `ee_twist` action: proportional to the error in world axes, its direction kept."""
+    """Return the first six entries of an `ee_twist` action: proportional to the error, scaled as a whole into [-1, 1].
+
+    Args:
+        tcp: pose of the tcp in the world.
+        target: target pose of the tcp in the world.
+        gain: gain of the law [1/s].
+    """
     turn = (target @ tcp.inverse()).quaternion
     sine = float(np.linalg.norm(turn[1:]))
     angle = 2.0 * math.atan2(sine, float(turn[0]))
@@ -197,7 +200,7 @@ def twist_action(tcp: Pose, target: Pose, gain: float) -> np.ndarray:
 
 
 class _Script:
-    """Actions that follow a path and end it, closed in a loop through `seen`, the last observation."""
+    """Actions that follow a path and end it, in closed loop through `seen`, the last observation."""
 
     def __init__(self, task: TaskDescription, playback: Playback):
         self._task, self._playback = task, playback
@@ -221,7 +224,7 @@ class _Script:
         return _pose(self.seen, "tcp_pose", 0)
 
     def _along(self, path: PosePath, grip: float) -> Iterator[np.ndarray]:
-        """Aim at the first pose that is far enough ahead, until the last one is reached or nothing gets nearer."""
+        """Aim at the first pose far enough ahead, until the last pose is reached or there is no progress."""
         index, last, nearest, waited = 0, len(path) - 1, math.inf, 0.0
         while waited < self._playback.patience:
             tcp, before = self._tcp, index
@@ -252,6 +255,6 @@ def _pose(observation: Observation, key: str, index: int) -> Pose:
 
 
 def _length(start: Pose, end: Pose) -> float:
-    """Screw length [m] between two poses."""
+    """Return the weighted path length [m] between two poses."""
     distance, angle = start.distance_to(end)
     return math.hypot(distance, METERS_PER_RADIAN * angle)

@@ -1,4 +1,4 @@
-"""Actors of what Stable-Baselines3 or plain torch has trained; needs the extra `rl`, but not to be imported."""
+"""Conversion of Stable-Baselines3 or plain torch models to actors; needs the extra `rl`, but imports without it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 
-from ...envs.core.description import TaskDescription
-from ...planner.errors import BadActor, BadOption
+from ...envs import TaskDescription
+from ...planner.errors import BadOption
 from ...planner.imitation.demonstration_files import UNREADABLE
+from ..errors import BadActor
 from ..extras import needed
 from .actor import Actor, TrainingInfo, actor_for
 from .actor_card import METHOD as RESIDUAL
@@ -23,11 +24,13 @@ from .features import Features
 from .network import ACTIVATIONS, Network
 
 EXTRA = "rl"
+"""Extra of onedemo that brings torch and Stable-Baselines3."""
 TRIES, TOLERANCE = 64, 1e-5
-"""Random features on which an actor must act as what it was made of, and how nearly."""
+"""Number of random features on which actor and model are compared, and largest difference of their actions."""
 MAX_DATA = 16 * 2**20
+"""Size limit [bytes] of the settings in a zip."""
 KINDS = {"target_entropy": "SAC", "clip_range": "PPO"}
-"""What the settings in a zip of Stable-Baselines3 tell of the algorithm."""
+"""Algorithms by a key that only their settings in a Stable-Baselines3 zip contain."""
 
 
 def actor_of(
@@ -41,21 +44,21 @@ def actor_of(
     config_hash: str = "",
     training: TrainingInfo | None = None,
 ) -> Actor:
-    """The actor of a trained model, once it is known to act as the model does.
+    """Return the actor of a trained model, after checking that it acts as the model does.
 
     Args:
         model: SAC, TQC or PPO of Stable-Baselines3 with an MLP policy; or a `torch.nn.Sequential` of linear layers with
             ReLU or Tanh between them and, if its output is squashed, Tanh at the end.
         task: `env.unwrapped.task` of the environment it was trained in.
-        method: name of the policy that will act by it, like "sac".
-        features: what it has seen, in this order; None: the entries of its own Dict of boxes as they are.
-        normalization: of the features; None: they are seen as they are.
+        method: name of the policy that will use the actor, like "sac".
+        features: features of its input, in order; None: the entries of its own Dict of boxes, unchanged.
+        normalization: scaling of the features; None: unscaled.
         residual_scale: see `Actor`.
         config_hash: see `Actor`.
         training: see `Actor`.
 
     Raises:
-        BadOption: the model is of another kind, or sees something else than these features.
+        BadOption: the model is of another kind, or has another input than these features.
         MissingExtra: torch is not installed.
     """
     needed("torch", EXTRA)
@@ -84,7 +87,7 @@ def actor_of(
 
 
 def network_of(model: Any) -> Network:
-    """The layers of a model; see `actor_of`.
+    """Return the layers of a model; see `actor_of`.
 
     Raises:
         BadOption: the model is of another kind.
@@ -103,10 +106,10 @@ def network_of(model: Any) -> Network:
 
 
 def actor_of_zip(path: Path, task: TaskDescription, *, method: str) -> Actor:
-    """The actor of a zip of Stable-Baselines3. Reading one may run whatever code its author put into it.
+    """Return the actor of a Stable-Baselines3 zip. Reading a zip may run any code its author put into it.
 
-    The zip says neither task nor robot nor control: they are taken to be those of `task`. Nor does it say how features
-    were scaled, so only models that see the environment's own Dict are read: those of `MultiInputPolicy`.
+    The zip names neither task nor robot nor control mode: those of `task` are assumed. Nor does it contain the scaling
+    of features, so only models that see the environment's own Dict can be read: those of `MultiInputPolicy`.
 
     Args:
         path: the zip.
@@ -114,7 +117,7 @@ def actor_of_zip(path: Path, task: TaskDescription, *, method: str) -> Actor:
         method: see `actor_of`.
 
     Raises:
-        BadActor: it cannot be read, or its model is of another kind.
+        BadActor: the zip cannot be read, or its model is of another kind.
         MissingExtra: Stable-Baselines3 is not installed.
     """
     library = needed("stable_baselines3", EXTRA)
@@ -134,7 +137,7 @@ def actor_of_zip(path: Path, task: TaskDescription, *, method: str) -> Actor:
 
 
 def _kind(path: Path) -> str:
-    """The algorithm of a zip, from its settings; these are JSON, and reading them runs nothing."""
+    """Return the algorithm of a zip, from its settings: these are JSON, so that reading them runs no code."""
     try:
         with zipfile.ZipFile(path) as archive, archive.open("data") as file:
             settings = json.loads(file.read(MAX_DATA))
@@ -147,7 +150,7 @@ def _kind(path: Path) -> str:
 
 
 def _stacked(modules: list[Any], output: str) -> Network:
-    """Linear layers with the same activation between all of them."""
+    """Return the network of linear layers with one activation between all of them."""
     linear, between = modules[::2], {type(module).__name__.lower() for module in modules[1::2]}
     for k, module in enumerate(modules):
         name, allowed = type(module).__name__, ("ReLU", "Tanh") if k % 2 else ("Linear",)
@@ -165,7 +168,7 @@ def _stacked(modules: list[Any], output: str) -> Network:
 
 
 def _difference(model: Any, network: Network) -> float:
-    """Largest difference between the actions of a model and those of its layers, on random features."""
+    """Return the largest difference between the actions of a model and of its layers, on random features."""
     rng = np.random.default_rng(0)
     features = rng.normal(size=(TRIES, network.sizes[0])).astype(np.float32)
     own = np.array([network(row) for row in features])
@@ -180,7 +183,7 @@ def _difference(model: Any, network: Network) -> float:
 
 
 def _observed(space: Any, features: np.ndarray) -> Any:
-    """Features (n, size) as the observations that a model takes them from."""
+    """Convert features (n, size) to the observations from which a model takes them."""
     if not hasattr(space, "spaces"):
         return features.reshape(len(features), *space.shape)
     ends = np.cumsum([int(np.prod(entry.shape)) for entry in space.spaces.values()])

@@ -1,4 +1,4 @@
-"""Features as a bounded box for training, scaled by numbers that are measured once and then stay."""
+"""Features as a bounded box for training, with a scaling that is measured once and then fixed."""
 
 from __future__ import annotations
 
@@ -10,32 +10,34 @@ import numpy as np
 from gymnasium import spaces
 
 from ...planner.errors import BadOption, BadShape, NotFinite
+from ...planner.ranges import check_ranges
 from ..policy import Observation
 from .features import Features
 
 CLIP = 10.0
-"""Scaled numbers beyond this are cut."""
+"""Scaled values beyond this are clipped."""
 HELD = 10
-"""Control steps for which a random action is held: new ones at every step would leave the arm where it is."""
+"""Control steps for which a random action is held: with a new action at every step the arm would hardly move."""
 LENGTH, SPEED, SHARE = 0.05, 0.25, 0.125
-"""Least scale of a length [m], of a joint speed [rad/s], and of all else as a share of its range: what random actions
-hardly move may well move later."""
+"""Least scale of a length [m], of a joint speed [rad/s], and of all other features as a share of their range: features
+that random actions hardly change may change more later."""
 LENGTHS = (".x", ".y", ".z")
+"""Endings of feature names that denote lengths, unless the name contains one of `AXIS`."""
 AXIS = ("x_axis", "z_axis")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Normalization:
-    """How features are scaled: less their mean, by their scale, and cut.
+    """Scaling of features: subtract the mean, divide by the scale, clip.
 
     Attributes:
         mean: (n,) float32, read-only.
         scale: (n,) float32, positive, read-only.
-        clip: largest absolute value afterwards; None: nothing is cut.
+        clip: largest absolute value afterwards; None: no clipping.
 
     Raises:
-        BadShape: mean and scale are not of one length.
-        NotFinite: one of them is not finite.
+        BadShape: mean and scale differ in length.
+        NotFinite: an entry of mean or scale is not finite.
         BadOption: a scale or the clip is not positive.
     """
 
@@ -54,27 +56,35 @@ class Normalization:
             object.__setattr__(self, name, array)
         if (self.scale <= 0.0).any():
             raise BadOption("scale", f"entry {int(np.argmax(self.scale <= 0.0))} is not positive")
-        if self.clip is not None and not 0.0 < self.clip < np.inf:
-            raise BadOption("clip", f"{self.clip} is not a positive number")
+        if self.clip is not None:
+            check_ranges(self, "(0, inf)", "clip")
 
     @staticmethod
     def none(size: int, clip: float | None = CLIP) -> Normalization:
-        """Features as they are."""
+        """Return the scaling that only clips.
+
+        Args:
+            size: number of features.
+            clip: see `Normalization`.
+        """
         return Normalization(np.zeros(size), np.ones(size), clip)
 
     def __call__(self, features: np.ndarray) -> np.ndarray:
-        """Scaled features (..., n) float32."""
+        """Return the scaled features (..., n) float32."""
         scaled = (features - self.mean) / self.scale
         return scaled if self.clip is None else np.clip(scaled, -np.float32(self.clip), np.float32(self.clip))
 
 
 class FlatFeatures(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
-    """An environment whose observation is a flat float32 box of features.
+    """Environment whose observation is a flat float32 box of features.
 
     Args:
-        env: with a Dict of boxes as its observation.
-        features: which; None: `Features.of` its observation space.
-        normalization: of them; None: they stay as they are, cut at `CLIP`.
+        env: environment with a Dict of boxes as its observation.
+        features: features to take; None: `Features.of` its observation space.
+        normalization: scaling of the features; None: unscaled, clipped at `CLIP`.
+
+    Raises:
+        BadShape: the normalization has another number of features.
     """
 
     def __init__(self, env: gym.Env, features: Features | None = None, normalization: Normalization | None = None):
@@ -88,23 +98,23 @@ class FlatFeatures(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         self.observation_space = spaces.Box(self.normalization(low), self.normalization(high), dtype=np.float32)
 
     def observation(self, observation: Observation) -> np.ndarray:
-        """The scaled features (n,) float32."""
+        """Return the scaled features (n,) float32."""
         return self.normalization(self.features(observation))
 
 
 def measured_normalization(
     env: Any, features: Features, *, episodes: int = 20, steps: int = 200, seed: int = 0
 ) -> Normalization:
-    """Mean and standard deviation of features over episodes of random actions, each held for `HELD` steps.
+    """Measure mean and standard deviation of features over episodes of random actions, each held for `HELD` steps.
 
-    Standard deviations below `LENGTH`, `SPEED` or `SHARE` of the range are raised to it.
+    Standard deviations below `LENGTH`, `SPEED` or `SHARE` of the range are raised to that limit.
 
     Args:
-        env: with a Dict of boxes as its observation.
-        features: which.
-        episodes: how many; episode k has the seed `seed + k`.
-        steps: most of an episode.
-        seed: of the first episode, and of the actions.
+        env: environment with a Dict of boxes as its observation.
+        features: features to measure.
+        episodes: number of episodes; episode k has the seed `seed + k`.
+        steps: largest number of steps per episode.
+        seed: seed of the first episode and of the actions.
     """
     rng, seen = np.random.default_rng(seed), []
     low, high = env.action_space.low, env.action_space.high
@@ -123,7 +133,7 @@ def measured_normalization(
 
 
 def _least(features: Features, space: spaces.Space[Any]) -> np.ndarray:
-    """Least scale (n,) of each feature."""
+    """Return the least scale (n,) of each feature."""
     low, high = features.bounds(space)
     least = SHARE * (high - low)
     for k, name in enumerate(features.names):

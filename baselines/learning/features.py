@@ -1,4 +1,4 @@
-"""What a learner sees of an observation: a flat vector of named numbers.
+"""Features: the part of an observation that a learner sees, as a flat vector of named numbers.
 
 Not in the paper: nothing is learned there.
 """
@@ -21,41 +21,42 @@ RELATIVE = {
     "goal_minus_tcp": ("goal_pose", "tcp_pose"),
     "goal_minus_object": ("goal_pose", "object_pose"),
 }
-"""Blocks of differences: of which entry, less which."""
+"""Blocks of differences: minuend and subtrahend entries."""
 RAW = "raw:"
-"""Before the name of an entry: its numbers as they stand in the observation."""
+"""Prefix of blocks that take an entry's numbers unchanged."""
 POSE, OBSTACLE = "_pose", "obstacle_"
 AXES = ("x", "y", "z", "x_axis.x", "x_axis.y", "x_axis.z", "z_axis.x", "z_axis.y", "z_axis.z")
 BETWEEN = ("x", "y", "z", "cos", "sin", "near_x", "near_y", "near_z")
+"""Names of the numbers of a difference."""
 NEAR = 0.02
-"""Lengths [m] up to which differences count most in the last three of them."""
+"""Length scale [m] of the saturated differences in the last three numbers of `BETWEEN`."""
 Shape = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Features:
-    """Which numbers of an observation a learner sees, in which order.
+    """Selection and order of the numbers of an observation that a learner sees.
 
     A block is one of:
 
-    - an entry of the observation by its name. Poses (names that end in `_pose`) become nine numbers: position [m], and
-      the frame's x and z axes in the world. They are the same for both signs of the quaternion, and continuous, which
-      no four numbers are (Zhou et al., On the Continuity of Rotation Representations in Neural Networks, CVPR 2019).
-      All else stands as it is.
-    - a name of `RELATIVE`: for each pair of poses the difference of the positions [m] in world axes, and the cosine and
-      sine of the turn between their x axes in the plane, each times the lengths of the two axes in the plane, so that
-      nothing jumps where an axis is upright; and tanh(difference / `NEAR`): on the scale of a table, what decides
-      whether a task succeeds is next to nothing. Goals and objects are paired in order where there are as many of each;
-      else every one with every other.
-    - `raw:NAME`: an entry's numbers as they are, as Stable-Baselines3's `MultiInputPolicy` takes them.
+    - the name of an observation entry. Poses (names that end in `_pose`) become nine numbers: position [m], and the
+      frame's x and z axes in the world. These do not depend on the sign of the quaternion, and are continuous, which no
+      four numbers are (Zhou et al., On the Continuity of Rotation Representations in Neural Networks, CVPR 2019). All
+      other entries stay unchanged.
+    - a name of `RELATIVE`: for each pair of poses the difference of the positions [m] in world axes; the cosine and
+      sine of the angle between their x axes in the horizontal plane, each times the lengths of the two projected axes,
+      so that nothing jumps where an axis is vertical; and tanh(difference / `NEAR`), because the differences that
+      decide on success are tiny on the scale of a table. Goals and objects are paired in order if there are as many
+      of each; otherwise every pose is paired with every other.
+    - `raw:NAME`: an entry's numbers unchanged, as Stable-Baselines3's `MultiInputPolicy` takes them.
 
     Attributes:
-        shapes: name and shape of every entry that the blocks need, by name.
-        blocks: in order.
+        shapes: name and shape of every entry that the blocks need, sorted by name.
+        blocks: the blocks, in order.
 
     Raises:
-        UnknownName: a block that is neither an entry nor a difference of entries.
-        BadOption: a pose that is not (n, 7), or a block that is there twice.
+        UnknownName: a block is neither an entry nor a difference of entries.
+        BadOption: a pose is not (n, 7), or a block occurs twice.
     """
 
     shapes: tuple[tuple[str, Shape], ...]
@@ -79,17 +80,17 @@ class Features:
     def of(
         space: spaces.Space[Any], keys: tuple[str, ...] | None = None, *, obstacles: bool = False, relative: bool = True
     ) -> Features:
-        """Features of an observation space.
+        """Return the features of an observation space.
 
         Args:
-            space: a Dict of boxes, as our environments have it.
-            keys: the entries that are seen; None: all but the obstacles'.
-            obstacles: the obstacles' entries are seen too; only where `keys` is None.
-            relative: the differences of `RELATIVE` are seen too, as far as their entries are.
+            space: Dict of boxes, as in this project's environments.
+            keys: entries to include; None: all but the obstacles'.
+            obstacles: include the obstacles' entries, too; only where `keys` is None.
+            relative: include the differences of `RELATIVE` whose entries are included.
 
         Raises:
-            BadOption: not a Dict of boxes.
-            UnknownName: a key that is not in it.
+            BadOption: the space is not a Dict of boxes.
+            UnknownName: the space lacks a key.
         """
         shapes = shapes_of(space)
         if keys is None:
@@ -99,27 +100,27 @@ class Features:
 
     @staticmethod
     def raw(space: spaces.Space[Any]) -> Features:
-        """What Stable-Baselines3's `MultiInputPolicy` makes of an observation space: one entry after the other."""
+        """Return the features that Stable-Baselines3's `MultiInputPolicy` takes: all entries, one after the other."""
         shapes = shapes_of(space)
         return Features(tuple(shapes.items()), tuple(f"{RAW}{key}" for key in shapes))
 
     @property
     def size(self) -> int:
-        """How many numbers there are."""
+        """Number of features."""
         return sum(self._size(block) for block in self.blocks)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """A name for each number, like `tcp_pose[0].z` or `goal_minus_object[1,1].cos`."""
+        """Name of each feature, like `tcp_pose[0].z` or `goal_minus_object[1,1].cos`."""
         return tuple(name for block in self.blocks for name in self._names(block))
 
     def __call__(self, observation: Observation) -> np.ndarray:
-        """The numbers (size,) float32 of an observation, or (..., size) of one with leading axes."""
+        """Return the features (size,) float32 of an observation, or (..., size) of one with leading axes."""
         parts = [self._values(block, observation) for block in self.blocks]
         return np.concatenate(parts, axis=-1).astype(np.float32)
 
     def bounds(self, space: spaces.Space[Any]) -> tuple[np.ndarray, np.ndarray]:
-        """Smallest and largest value (size,) of each number, from those of the space."""
+        """Return the smallest and largest value (size,) of each feature, from the bounds of the space."""
         low, high = ({key: _box(space, key, end) for key, _ in self.shapes} for end in ("low", "high"))
         lowest = [self._bound(block, low, high, -1.0) for block in self.blocks]
         highest = [self._bound(block, high, low, 1.0) for block in self.blocks]
@@ -166,7 +167,7 @@ class Features:
     def _bound(
         self, block: str, near: Mapping[str, np.ndarray], far: Mapping[str, np.ndarray], unit: float
     ) -> np.ndarray:
-        """Bound of a block on the side of `unit`; `near` has the entries' bounds on that side, `far` the others."""
+        """Return a block's bound on the side of `unit`, from the entries' bounds on this side and the far side."""
         if block in RELATIVE:
             of, less = (bounds[key][:, :3] for bounds, key in zip((near, far), RELATIVE[block], strict=True))
             gap = of - less if self._paired(block) else (of[:, None] - less[None]).reshape(-1, 3)
@@ -178,15 +179,15 @@ class Features:
 
 
 def keys_of(block: str) -> tuple[str, ...]:
-    """The entries of the observation that a block is made of."""
+    """Return the observation entries that a block is made of."""
     return RELATIVE.get(block) or (block.removeprefix(RAW),)
 
 
 def shapes_of(space: spaces.Space[Any]) -> dict[str, Shape]:
-    """Names and shapes of the entries of an observation space.
+    """Return the shapes of the entries of an observation space, by name.
 
     Raises:
-        BadOption: it is not a Dict of boxes.
+        BadOption: the space is not a Dict of boxes.
     """
     if not isinstance(space, spaces.Dict):
         raise BadOption("observation_space", f"is a {type(space).__name__}, not a Dict of boxes")
@@ -205,12 +206,12 @@ def _is_pose(block: str) -> bool:
 
 
 def _flat(values: np.ndarray, axes: int) -> np.ndarray:
-    """The last axes as one."""
+    """Merge the last axes into one."""
     return values.reshape(*values.shape[: values.ndim - axes], -1)
 
 
 def _axis(poses: np.ndarray, axis: int) -> np.ndarray:
-    """The x or z axis (..., 3) of the frames of poses (..., 7), in the world: a column of the rotation matrix."""
+    """Return the x or z axis (..., 3) of the frames of poses (..., 7) in the world: a column of the rotation matrix."""
     w, x, y, z = (poses[..., k] for k in range(3, 7))
     if axis == 0:
         return np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=-1)
@@ -218,7 +219,7 @@ def _axis(poses: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _between(of: np.ndarray, less: np.ndarray, paired: bool) -> np.ndarray:
-    """Differences (..., n, 8) of poses in order, or (..., n, m, 8) of each from each; see `Features`."""
+    """Return the differences (..., n, 8) of poses in order, or (..., n, m, 8) of every pair; see `Features`."""
     if not paired:
         of, less = of[..., :, None, :], less[..., None, :, :]
     to, start = _axis(of, 0), _axis(less, 0)

@@ -1,4 +1,4 @@
-"""Policies that were learned beforehand: an actor's file, no training, no torch."""
+"""Policies learned beforehand: they need an actor's file, but neither training nor torch."""
 
 from __future__ import annotations
 
@@ -8,33 +8,34 @@ from pathlib import Path
 
 import numpy as np
 
-from ...configs.shipped_files import shipped_actor
-from ...envs.core.description import TaskDescription
-from ...planner.errors import BadActor, BadOption, UnknownName
+from ...configs import shipped_actor
+from ...envs import TaskDescription
+from ...planner.errors import BadOption, UnknownName
+from ..errors import BadActor
 from ..policy import EpisodePolicy, Observation
 from .actor import Actor
 from .actor_files import card_path, foreign, load_actor
 
 METHODS = ("sac", "ppo", "sac-her", "sac-demo", "bc")
-"""Whose action is the actor's; `residual` adds it to another policy's."""
+"""Methods whose action is the actor's output; `residual` adds that output to another policy's action."""
 DIGITS = 16
-"""Of a SHA-256, as many as tell actors apart."""
+"""Digits of a SHA-256 that suffice to distinguish actors."""
 HERE = Path("actor")
-"""What stands for the file of an actor that has none."""
+"""Stand-in path of an actor without a file."""
 
 
 @dataclass(frozen=True, slots=True)
 class LearnedSettings:
-    """Which actor acts.
+    """Choice of the actor.
 
     Attributes:
-        checkpoint: name of a shipped actor, or a file as `load_actor` takes it; "": the shipped one of this method,
+        checkpoint: name of a shipped actor, or a file that `load_actor` accepts; "": the shipped actor of this method,
             task and robot.
-        allow_pickle: a zip of Stable-Baselines3 is read too, which may run whatever code its author put into it;
-            needs the extra `rl`.
-        sha256: of the actor's file (the .json, which holds that of the weights), or its beginning; "": not looked at.
-            A run writes it down, and goes on only with the same actor.
-        training_steps: of the environment that its training took, for reports; a run writes it down.
+        allow_pickle: also read a Stable-Baselines3 zip, which may run any code its author put into it; needs the extra
+            `rl`.
+        sha256: SHA-256 of the actor's file (the .json, which contains that of the weights), or its beginning; "": not
+            checked. A run records it, and continues only with the same actor.
+        training_steps: environment steps of its training, for reports; recorded by a run.
     """
 
     checkpoint: str = ""
@@ -44,14 +45,14 @@ class LearnedSettings:
 
 
 class LearnedPolicy(EpisodePolicy):
-    """Acts as its actor does; remembers nothing.
+    """Policy that acts as its actor does, without memory.
 
     Args:
-        actor: it.
-        source: its file, for messages.
+        actor: the actor.
+        source: file of the actor, for messages.
 
     Raises:
-        BadActor: the actor is one that corrects another policy.
+        BadActor: the actor corrects another policy.
     """
 
     def __init__(self, actor: Actor, source: Path):
@@ -61,35 +62,46 @@ class LearnedPolicy(EpisodePolicy):
 
     @classmethod
     def by(cls, actor: Actor) -> LearnedPolicy:
-        """The policy of an actor that is at hand."""
+        """Return the policy of an actor in memory."""
         return cls(actor, HERE)
 
     @classmethod
     def found(cls, method: str, task: TaskDescription, settings: LearnedSettings) -> LearnedPolicy:
-        """The policy of the actor that settings mean; see `found_actor`."""
+        """Return the policy of the actor that the settings name; see `found_actor`.
+
+        Args:
+            method: name of the method.
+            task: the task.
+            settings: choice of the actor.
+        """
         return cls(*found_actor(method, task, settings))
 
     def is_batch(self, observation: Observation) -> bool:
-        """See `EpisodePolicy`; in the goal form of an environment there are no joint positions to tell it by."""
+        """See `EpisodePolicy`; uses the actor's first entry, because the goal form has no joint positions."""
         key, shape = self.actor.features.shapes[0]
         return key in observation and np.ndim(observation[key]) == len(shape) + 1
 
     def begin(self, observation: Observation) -> tuple[()]:
-        """Nothing to remember, once the observation is known to be the actor's."""
+        """See `EpisodePolicy`; checks the first observation."""
         check_seen(self.actor, observation, self._source)
         return ()
 
     def act(self, observation: Observation, memory: tuple[()]) -> np.ndarray:
-        """The actor's action."""
+        """See `EpisodePolicy`."""
         return self.actor(observation).astype(np.float64)
 
 
 def found_actor(method: str, task: TaskDescription, settings: LearnedSettings) -> tuple[Actor, Path]:
-    """The actor that the settings mean, fit for the method and the task; and its file.
+    """Return the actor that the settings name, checked against method and task, and its file.
+
+    Args:
+        method: name of the method.
+        task: the task.
+        settings: choice of the actor.
 
     Raises:
-        BadActor: the actor cannot be read, or is of another method, task, robot, control or observation.
-        BadOption: there is none.
+        BadActor: the actor cannot be read, or has another method, task, robot, control mode or observation.
+        BadOption: there is no such actor.
     """
     path = actor_file(method, task.name, task.robot, settings.checkpoint)
     if (found := sha256_of(path)) is not None and not found.startswith(settings.sha256):
@@ -108,18 +120,29 @@ def found_actor(method: str, task: TaskDescription, settings: LearnedSettings) -
 def check_seen(actor: Actor, observation: Observation, source: Path) -> None:
     """Refuse an observation that the actor was not made for.
 
+    Args:
+        actor: the actor.
+        observation: an observation of the task.
+        source: file of the actor, for messages.
+
     Raises:
-        BadActor: naming the first entry that is missing or of another shape.
+        BadActor: the first entry that is missing or has another shape.
     """
     if unseen := actor.unseen({key: np.shape(value) for key, value in observation.items()}):
         raise BadActor(source, *unseen)
 
 
 def actor_file(method: str, task: str, robot: str, checkpoint: str) -> Path:
-    """The file that a checkpoint means; without one, that of the actor shipped for a method, task and robot.
+    """Return the file of a checkpoint, or of the actor shipped for a method, task and robot.
+
+    Args:
+        method: name of the method.
+        task: name of the task.
+        robot: robosuite's name of the robot.
+        checkpoint: see `LearnedSettings`.
 
     Raises:
-        BadOption: none is shipped.
+        BadOption: no such actor is shipped.
     """
     name = checkpoint or f"{method}-{task}-{robot}"
     try:
@@ -135,7 +158,7 @@ def actor_file(method: str, task: str, robot: str, checkpoint: str) -> Path:
 
 
 def sha256_of(path: Path) -> str | None:
-    """Of an actor's .json, or of whatever file it is; None: it cannot be read."""
+    """Return the SHA-256 of an actor's .json, or of a foreign file itself; None if it cannot be read."""
     try:
         return hashlib.sha256((path if foreign(path) else card_path(path)).read_bytes()).hexdigest()
     except OSError:

@@ -1,4 +1,4 @@
-"""A small neural network, evaluated by NumPy alone."""
+"""Small neural network, evaluated with NumPy alone."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...planner.errors import BadOption, BadShape, NotFinite
+from ...planner.ranges import check_choice
 
 ACTIVATIONS = ("relu", "tanh")
 OUTPUTS = ("tanh", "clip")
@@ -14,17 +15,17 @@ OUTPUTS = ("tanh", "clip")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Network:
-    """A multilayer perceptron in single precision, the same bits every time on one machine.
+    """Multilayer perceptron in single precision; its output is reproducible bit for bit on one machine.
 
     Attributes:
         weights: (out, in) float32 per layer, read-only.
         biases: (out,) float32 per layer, read-only.
-        activation: between layers, one of `ACTIVATIONS`.
-        output: how the last layer's numbers come to lie in [-1, 1], one of `OUTPUTS`.
+        activation: activation between layers, one of `ACTIVATIONS`.
+        output: function that maps the last layer's output to [-1, 1], one of `OUTPUTS`.
 
     Raises:
-        BadShape: layers that do not fit on each other.
-        NotFinite: a weight or a bias.
+        BadShape: the layers do not fit together.
+        NotFinite: a weight or a bias is not finite.
         BadOption: an unknown activation or output, or no layer.
     """
 
@@ -37,8 +38,7 @@ class Network:
         if not self.weights or len(self.weights) != len(self.biases):
             raise BadOption("layers", f"there are {len(self.weights)} weights and {len(self.biases)} biases")
         for key, allowed in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
-            if getattr(self, key) not in allowed:
-                raise BadOption(key, f"{getattr(self, key)!r} is not one of {', '.join(allowed)}")
+            check_choice(key, getattr(self, key), allowed)
         for key in ("weights", "biases"):
             arrays = tuple(_single(f"{key} of layer {k}", array) for k, array in enumerate(getattr(self, key)))
             object.__setattr__(self, key, arrays)
@@ -52,14 +52,14 @@ class Network:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """How many numbers go in, how many come out of each layer."""
+        """Number of inputs, then number of outputs of each layer."""
         return (self.weights[0].shape[1], *(len(bias) for bias in self.biases))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """What comes out (m,) float32, in [-1, 1], of what goes in (n,) float32."""
+        """Return the output (m,) float32, in [-1, 1], for an input (n,) float32."""
         last = len(self.weights) - 1
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            # not by BLAS, whose sums depend on the number of its threads
+            # einsum, not BLAS, whose sums depend on the number of its threads
             x = np.einsum("oi,i->o", weight, x) + bias
             if k < last:
                 x = np.maximum(x, np.float32(0.0)) if self.activation == "relu" else np.tanh(x)

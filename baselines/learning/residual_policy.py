@@ -1,4 +1,4 @@
-"""Learning on top of the method: the screw policy acts, an actor corrects it."""
+"""Residual learning: the screw policy acts, and a learned actor corrects its actions."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from ...envs.core.description import TaskDescription
-from ...planner.errors import BadActor, BadOption
-from ...planner.imitation.demonstration import Demonstration
+from ...envs import TaskDescription
+from ...planner import Demonstration
+from ...planner.errors import BadOption
+from ..errors import BadActor
 from ..policy import EpisodePolicy, Observation, PolicyReport
 from ..program_policy import Episode
 from ..screw_policy import ScrewPolicy
@@ -21,26 +22,37 @@ from .actor_card import METHOD
 from .learned_policy import HERE, LearnedSettings, check_seen, found_actor
 
 SCREW_ACTION = "screw_action"
-"""Entry of the observation: what the screw policy would do."""
+"""Observation entry with the screw policy's action."""
 SHARE = 0.1
-"""How fast a correction can be, of the fastest joint of the method at that time, unless it is said."""
+"""Default limit of a correction, as a share of the speed of the method's fastest joint at that time."""
 
 
 def corrected(action: np.ndarray, correction: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """The action that is taken (n,), in [-1, 1]: another policy's and, entry by entry scaled, the learner's.
+    """Return the corrected action (n,), clipped to [-1, 1].
 
-    Corrections are as fast as the other policy is: where it comes to rest they end. With corrections of 0.05 of a full
-    action at any time, random ones, as exploration is, left 3 of 6 successes of PlaceOne, and without successes nothing
-    is learned of them; with 0.2 of the policy's own speed, 6 of 6.
+    Corrections are proportional to the other policy's speed and end where it comes to rest. With random corrections, as
+    in exploration, of 0.05 of a full action at any time, PlaceOne kept 3 of 6 successes, and without successes nothing
+    is learned from them; with 0.2 of the policy's own speed it kept 6 of 6.
+
+    Args:
+        action: (n,) action of the other policy.
+        correction: (n,) action of the learner, in [-1, 1].
+        scale: (n,) see `Actor.residual_scale`.
     """
     speed = float(np.abs(action[scale > 0.0]).max(initial=0.0))
     return np.clip(action + speed * scale * correction, -1.0, 1.0)
 
 
 def notify(memory: Episode, task: TaskDescription, action: np.ndarray, taken: np.ndarray) -> None:
-    """Let the screw policy know what was taken instead of its action: it goes on from the joints that were commanded.
+    """Tell the screw policy which action was taken, so that it continues from the commanded joints.
 
-    Otherwise corrections would add up to a way off that nothing leads back from.
+    Otherwise corrections would add up to a drift that nothing leads back from.
+
+    Args:
+        memory: memory of the screw policy; its commanded joints are changed.
+        task: the task.
+        action: (n,) action of the screw policy.
+        taken: (n,) action taken instead.
     """
     limits = np.stack([arm.velocity_limits for arm in task.arms])
     extra = (taken - action).reshape(len(limits), -1)[:, :-1]
@@ -48,25 +60,31 @@ def notify(memory: Episode, task: TaskDescription, action: np.ndarray, taken: np
 
 
 def default_scale(task: TaskDescription, share: float = SHARE) -> tuple[float, ...]:
-    """The same for every joint, nothing for the grippers: 0 leaves a gripper, the least below 0 drops what it holds."""
+    """Return the scale of corrections: `share` for every joint, 0 for the grippers.
+
+    A gripper entry of 0 leaves the gripper as it is, but even a slightly negative one drops the held object.
+
+    Args:
+        task: the task.
+        share: see `SHARE`.
+    """
     return tuple([*[share] * task.arms[0].dof, 0.0] * len(task.arms))
 
 
 class AroundScrew(gym.Wrapper, gym.utils.RecordConstructorArgs):
-    """An environment in which the screw policy acts and a learner's actions correct it.
+    """Environment in which the screw policy acts and a learner's actions correct it.
 
-    The observation has one entry more, `screw_action`: the action that the correction is added to. Once the screw
-    policy has ended or given up it stands still.
+    The observation has one more entry, `screw_action`: the action to which the correction is added. Once the screw
+    policy has finished or failed, it stands still.
 
     Args:
-        env: of ours, in the control mode `joint_velocity`.
+        env: environment of this project in the control mode `joint_velocity`.
         demonstration: the ONE demonstration.
-        scale: per entry of the action, how fast a correction can be, of the fastest joint that is corrected; None:
-            `default_scale`.
+        scale: (n,) see `Actor.residual_scale`; None: `default_scale`.
 
     Attributes:
         scale: see the arguments.
-        screw_action: what the screw policy would do now.
+        screw_action: (n,) next action of the screw policy.
 
     Raises:
         BadOption: another control mode, or a scale of another length.
@@ -87,13 +105,13 @@ class AroundScrew(gym.Wrapper, gym.utils.RecordConstructorArgs):
         self.screw_action = np.zeros(len(self.scale))
 
     def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
-        """Start an episode, of the screw policy too."""
+        """Start an episode of the environment and of the screw policy."""
         observation, info = self.env.reset(**kwargs)
         self._memory = self._screw.begin(observation)
         return self._seen(observation), info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Act as the screw policy would, corrected."""
+        """Take the screw policy's action, corrected by `action`."""
         taken = corrected(self.screw_action, np.clip(action, -1.0, 1.0), np.array(self.scale))
         assert self._memory is not None
         notify(self._memory, self._screw.task, self.screw_action, taken)
@@ -107,16 +125,16 @@ class AroundScrew(gym.Wrapper, gym.utils.RecordConstructorArgs):
 
 
 class ResidualPolicy(EpisodePolicy):
-    """The screw policy, corrected by an actor that was trained in `AroundScrew`.
+    """Screw policy, corrected by an actor that was trained in `AroundScrew`.
 
     Args:
         task: see `make_policy`.
         demonstration: see `make_policy`.
-        actor: it.
-        source: its file, for messages.
+        actor: the actor.
+        source: file of the actor, for messages.
 
     Raises:
-        BadActor: the actor does not say how much of it is added.
+        BadActor: the actor has no residual scale.
         BadOption: the task's actions are not joint velocities.
     """
 
@@ -128,26 +146,38 @@ class ResidualPolicy(EpisodePolicy):
 
     @classmethod
     def by(cls, task: TaskDescription, demonstration: Demonstration, actor: Actor) -> ResidualPolicy:
-        """The policy of an actor that is at hand."""
+        """Return the policy of an actor in memory.
+
+        Args:
+            task: see `make_policy`.
+            demonstration: see `make_policy`.
+            actor: the actor.
+        """
         return cls(task, demonstration, actor, HERE)
 
     @classmethod
     def found(cls, task: TaskDescription, demonstration: Demonstration, settings: LearnedSettings) -> ResidualPolicy:
-        """The policy of the actor that settings mean; see `found_actor`."""
+        """Return the policy of the actor that the settings name; see `found_actor`.
+
+        Args:
+            task: see `make_policy`.
+            demonstration: see `make_policy`.
+            settings: choice of the actor.
+        """
         return cls(task, demonstration, *found_actor(METHOD, task, settings))
 
     def begin(self, observation: Observation) -> Episode:
-        """The screw policy's memory."""
+        """See `EpisodePolicy`; the memory is the screw policy's."""
         check_seen(self.actor, {**observation, SCREW_ACTION: self._scale}, self._source)
         return self.screw.begin(observation)
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:
-        """The screw policy's action, corrected."""
+        """See `EpisodePolicy`; returns the screw policy's action, corrected."""
         action = self.screw.act(observation, memory)
         taken = corrected(action, self.actor({**observation, SCREW_ACTION: action}), self._scale)
         notify(memory, self.screw.task, action, taken)
         return taken
 
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
-        """The screw policy's."""
+        """See `ProgramPolicy`."""
         return self.screw.report(state, index)

@@ -1,1 +1,1 @@
-"""Ways to move the tool from a pose to a goal: the method and its opponents."""
+"""Methods that move the tool from a pose to a goal: the project's own and the baselines."""

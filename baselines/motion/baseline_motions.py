@@ -1,7 +1,7 @@
-"""The other policies of the comparison: the same programs, other ways to move a leg.
+"""The baseline policies: identical programs, other methods of executing a motion.
 
-None has a guard by default, since their authors have none; `guard: true` gives each the method's, which shows how
-much of the method the guard alone is.
+By default none has a guard, since the original methods have none; `guard: true` gives each the project's own, which
+shows the guard's share of the method's success.
 """
 
 from __future__ import annotations
@@ -11,12 +11,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.imitation.tsia import GUIDE_START, guide_index
-from ...planner.planning.settings import PlanSettings
-from ...planner.reactive.command import ReactiveSettings
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner import Arm, Body, PlanSettings, Pose, PosePath, ReactiveSettings, guide_index
+from ...planner.imitation.tsia import GUIDE_START
 from .dmp import Dmp, DmpSettings
 from .generated_follower import GeneratedFollower
 from .generated_plan import GeneratedPlanner
@@ -28,7 +24,7 @@ from .tool_obstacles import ToolObstacles
 
 
 class GeneratedMotion:
-    """Legs moved along the paths of a maker."""
+    """Motions along the paths of a generator."""
 
     def __init__(self, generator: PathGenerator):
         self._generator = generator
@@ -42,22 +38,22 @@ class GeneratedMotion:
         return GeneratedFollower(arm, body, settings, self._generator)
 
     def skipped(self, done: int) -> int:
-        """All where the whole segment would be done again; none where there is a guiding pose behind them."""
+        """Return `done` if the whole segment would be repeated; 0 if a guiding pose lies beyond the poses done."""
         return 0 if self._generator.guided else done
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """See `MotionMethod`. Of a path that is nowhere what was shown, the same share counts as the way to it."""
+        """See `MotionMethod`. If the path never follows the demonstration, the same fraction counts as the approach."""
         guide = guide_index(shown, GUIDE_START)
         path = self._generator.make(shown, start, shown[-1], guide, ToolObstacles(np.empty((0, 7)), ())).path
         tail = len(path) - guide_index(path, GUIDE_START) if self._generator.avoids else len(shown)
         return Relative(path, len(shown) - guide if self._generator.guided else min(tail, len(path)))
 
     def dual_arm_path(self, arms, q, ends, seen, dt) -> None:
-        """Along their paths."""
+        """See `MotionMethod`: the arms follow their paths."""
 
 
 class DecoupledMotion(ScrewMotion):
-    """The method's mover; what one hand does seen from another is interpolated apart, too."""
+    """The project's own method; the relative motion of two hands is interpolated decoupled, too."""
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
         """See `MotionMethod`."""
@@ -66,14 +62,14 @@ class DecoupledMotion(ScrewMotion):
 
 @dataclass(frozen=True, slots=True)
 class GeneratedMotionSettings(ProgramSettings):
-    """Of a policy that moves along the paths of a maker."""
+    """Settings of a policy that moves along the paths of a generator."""
 
     guard: bool = False
 
     @property
     @abstractmethod
     def generator(self) -> PathGenerator:
-        """Of the paths."""
+        """Generator of the paths."""
 
     @property
     def motion_method(self) -> MotionMethod:
@@ -88,10 +84,10 @@ class GeneratedMotionSettings(ProgramSettings):
 
 @dataclass(frozen=True, slots=True)
 class DecoupledSettings(GeneratedMotionSettings):
-    """Of `decoupled`: the method without escape trees, search and guard, position and orientation apart.
+    """Settings of `decoupled`: the method without escape trees, search and guard, position and orientation decoupled.
 
-    The blend is the controller's pull, as the method's is, not a path that is followed: a path would be left less
-    freely, and the comparison would not be of the screw alone.
+    The blend is produced by the controller's pull, as in the method, not by a path to follow: deviations from a path
+    would be less free, and the comparison would not be of the screw alone.
     """
 
     @property
@@ -113,7 +109,7 @@ class DecoupledSettings(GeneratedMotionSettings):
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings(GeneratedMotionSettings):
-    """Of `replay`: the demonstration moved rigidly, a straight way to its beginning."""
+    """Settings of `replay`: the demonstration moved rigidly, after a straight path to its beginning."""
 
     @property
     def generator(self) -> PathGenerator:
@@ -123,7 +119,7 @@ class ReplaySettings(GeneratedMotionSettings):
 
 @dataclass(frozen=True, slots=True)
 class PotentialSettings(GeneratedMotionSettings):
-    """Of `potential`: TSIA in a potential field.
+    """Settings of `potential`: TSIA in a potential field.
 
     Attributes:
         field: see `FieldSettings`.
@@ -139,7 +135,7 @@ class PotentialSettings(GeneratedMotionSettings):
 
 @dataclass(frozen=True, slots=True)
 class DmpWorldSettings(GeneratedMotionSettings):
-    """Of `dmp-world`: a primitive learned in the world's frame.
+    """Settings of `dmp-world`: a movement primitive learned in the world frame.
 
     Attributes:
         dmp: see `DmpSettings`.
@@ -155,7 +151,7 @@ class DmpWorldSettings(GeneratedMotionSettings):
 
 @dataclass(frozen=True, slots=True)
 class DmpGoalSettings(DmpWorldSettings):
-    """Of `dmp-goal`: a primitive learned in the goal's frame."""
+    """Settings of `dmp-goal`: a movement primitive learned in the goal's frame."""
 
     @property
     def generator(self) -> PathGenerator:

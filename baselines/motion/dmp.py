@@ -1,8 +1,8 @@
 """Cartesian dynamic movement primitives (Ude et al. 2014) with an obstacle coupling term (Hoffmann et al. 2009).
 
-By the library `movement_primitives`. The primitive learns the segment in the goal's frame or in the world's; the
-first is the fair one: in the world's frame a turned goal keeps the direction of the demonstration. Time is the
-demonstration's length with a smooth start and end, since segments carry none.
+By the library `movement_primitives`. The primitive learns the segment in the goal's frame or in the world frame; the
+former is the fair variant: in the world frame a rotated goal keeps the direction of the demonstration. Time is the
+path length of the demonstration with a smooth start and end, since segments carry no time.
 """
 
 from __future__ import annotations
@@ -13,36 +13,36 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.errors import BadOption
+from ...planner import Pose, PosePath
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import Pose, PosePath
 from ...planner.imitation.tsia import BLEND_STEP, STILL
+from ...planner.ranges import check_ranges
 from ..extras import needed
 from .path_generators import GeneratedPath, PathGenerator, straight_path
 from .tool_obstacles import ToolObstacles
 
 LEAST_STEPS = 50
-"""Steps of the shortest primitive; a longer one has as many as the segment has poses."""
+"""Steps of the shortest primitive; a longer primitive has as many as the segment has poses."""
 CLOSE = 5e-4
-"""Screw distance to the goal at which it has arrived: [m], and a fifth of it in radians."""
+"""Distance to the goal that counts as arrival: [m], and five times this in radians."""
 MIN_CLEARANCE = 1e-3
-"""Room [m] below which an obstacle counts as no nearer: the direction to it must stay."""
+"""Slack [m] to which closer obstacles are clamped, so that their direction stays defined."""
 LONGER = 3.0
-"""Time until it is given up, over the demonstration's."""
+"""Duration at which the primitive stops, relative to the demonstration."""
 
 
 @dataclass(frozen=True, slots=True)
 class DmpSettings:
-    """A primitive.
+    """Settings of a movement primitive.
 
     Attributes:
-        weights: of the forcing term, per dimension.
-        regularization: of their regression; without any, what is left of the force at the end holds the primitive
+        weights: number of weights of the forcing term, per dimension.
+        regularization: of their regression; without regularization, the remaining force at the end holds the primitive
             some millimeters off its goal.
-        gamma: gain of the coupling term; 0: obstacles are not looked at.
-        beta: how fast the coupling term falls with the angle between motion and obstacle [1/rad].
-        influence: distance [m] at which an obstacle begins to count. The formula has none: it would turn away
-            from what is far behind the goal.
+        gamma: gain of the coupling term; 0 ignores obstacles.
+        beta: decay of the coupling term with the angle between motion and obstacle [1/rad].
+        influence: distance [m] at which an obstacle begins to act. The original formula lacks this limit: it would turn
+            away from obstacles far behind the goal.
     """
 
     weights: int = 60
@@ -52,19 +52,19 @@ class DmpSettings:
     influence: float = 0.1
 
     def __post_init__(self):
-        if not 2 <= self.weights <= 1000:
-            raise BadOption("weights", f"{self.weights} is not from 2 to 1000")
-        for name in ("regularization", "gamma", "beta", "influence"):
-            if not 0.0 <= getattr(self, name) <= 1e6:
-                raise BadOption(name, f"{getattr(self, name)} is not from 0 to a million")
+        check_ranges(self, "[2, 1000]", "weights")
+        check_ranges(self, "[0, 1000000]", "regularization", "gamma", "beta", "influence")
 
 
 class Dmp(PathGenerator):
-    """Paths of a primitive that is learned from the segment.
+    """Paths of a movement primitive learned from the segment.
 
     Args:
         settings: see `DmpSettings`.
-        in_goal_frame: learn and run in the goal's frame; False: in the world's.
+        in_goal_frame: True: learn and run in the goal's frame; False: in the world frame.
+
+    Raises:
+        MissingExtra: `movement_primitives` is not installed.
     """
 
     avoids = True
@@ -92,7 +92,7 @@ class Dmp(PathGenerator):
         return self._made(list(made.states[: index + 1]), near)
 
     def _learned(self, shown: PosePath) -> Any:
-        """A primitive that has learned a path (in its own frame), over one unit of time."""
+        """Return a primitive that has learned a path (in its own frame), over one unit of time."""
         lengths = shown.lengths()
         count = max(LEAST_STEPS, len(shown))
         t = np.linspace(0.0, 1.0, count + 1)
@@ -105,14 +105,14 @@ class Dmp(PathGenerator):
         return primitive
 
     def _made(self, states: list, near: ToolObstacles) -> GeneratedPath:
-        """Go on from the last state: (primitive, its frame, step, position and quaternion, velocity)."""
+        """Continue from the last state: (primitive, its frame, step, position and quaternion, velocity)."""
         primitive, world, step, y, yd = states[-1]
         coupling = _Coupling(self._library, self.settings, world, near)
         goal = primitive.goal_y
         for count in range(step, round(LONGER / primitive.dt_)):
             # for small angles, half the angle is the difference of the quaternions
             if np.linalg.norm(y[:3] - goal[:3]) < CLOSE and 0.4 * np.linalg.norm(y[3:] - goal[3:]) < CLOSE:
-                # the rest of the way to an attractor takes forever
+                # the remaining approach to an attractor takes infinite time
                 states.append((primitive, world, count, goal, yd))
                 break
             coupling.turn, primitive.t = y[3:], count * primitive.dt_
@@ -124,9 +124,9 @@ class Dmp(PathGenerator):
 
 
 class _Coupling:
-    """Turns the velocity away from the closest point of each obstacle; the library's term is for a point.
+    """Coupling term that turns the velocity away from the closest point of each obstacle; the library's is for a point.
 
-    It is called for the position and for the quaternion, which it leaves alone.
+    Called for the position and for the quaternion, which stays unchanged.
     """
 
     def __init__(self, library: ModuleType, settings: DmpSettings, world: Pose, near: ToolObstacles):
@@ -136,7 +136,7 @@ class _Coupling:
         self.turn = np.array([1.0, 0.0, 0.0, 0.0])
 
     def coupling(self, y: np.ndarray, yd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Change of velocity (3,), which is none, and of acceleration (3,)."""
+        """Return the changes of velocity (3,), which is zero, and of acceleration (3,) [m per unit of time squared]."""
         total = np.zeros(3)
         if len(y) != 3 or not self._settings.gamma or np.linalg.norm(yd) < 1e-9:
             return np.zeros(3), total
@@ -151,7 +151,7 @@ class _Coupling:
 
 
 def _interpolated(path: PosePath, lengths: np.ndarray, along: np.ndarray) -> PosePath:
-    """Poses at some lengths along a path, on the screws between its poses."""
+    """Return poses at given path lengths, on the screws between a path's poses."""
     index = np.clip(np.searchsorted(lengths, along, side="right") - 1, 0, len(path) - 2)
     steps = lengths[index + 1] - lengths[index]
     share = np.clip((along - lengths[index]) / np.where(steps > 0.0, steps, 1.0), 0.0, 1.0)
@@ -160,7 +160,7 @@ def _interpolated(path: PosePath, lengths: np.ndarray, along: np.ndarray) -> Pos
 
 
 def _vector(pose: Pose, like: np.ndarray) -> np.ndarray:
-    """(7,) position and quaternion, of the two signs the one that is nearer to another."""
+    """Return position and quaternion (7,), with the sign nearer to another quaternion."""
     turn = pose.dq[:4] if pose.dq[:4] @ like >= 0.0 else -pose.dq[:4]
     return np.concatenate([pose.position, turn])
 

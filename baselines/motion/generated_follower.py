@@ -8,77 +8,104 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...planner.control.pursuit import INDEX
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle
-from ...planner.imitation.tsia import guide_index
-from ...planner.planning.plan import NextMotion, Plan
-from ...planner.reactive.command import Command, ReactiveSettings
-from ...planner.reactive.reactive_planner import ReactivePlanner
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner import (
+    Arm,
+    Body,
+    Command,
+    NextMotion,
+    Obstacle,
+    Plan,
+    Pose,
+    PosePath,
+    ReactivePlanner,
+    ReactiveSettings,
+    guide_index,
+)
+from ...planner.control.arm_arrays import PURSUIT_STATE
+from ...planner.reactive.motion_state import MotionState
 from .path_generators import GeneratedPath, PathGenerator
 from .tool_obstacles import ToolObstacles
 
 RENEWED = 0.1
-"""Seconds between two paths while obstacles move."""
+"""Time [s] between two paths while obstacles move."""
+
+
+class _Task(NamedTuple):
+    """The arguments of a path generator for one motion: demonstrated path, goal, index of the guiding pose."""
+
+    demonstrated: PosePath
+    goal: Pose
+    guide: int
 
 
 class GeneratedFollower(ReactivePlanner):
-    """A `ReactivePlanner` that follows the paths of a maker, and leads them round nothing."""
+    """Follows the paths of a path generator, without detours of its own.
+
+    Args:
+        arm: the arm.
+        body: its capsules, held object included.
+        settings: see `ReactiveSettings`; detours, search and prediction are switched off.
+        generator: of the paths.
+    """
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, generator: PathGenerator):
-        self._generator, self._leg, self._made, self._old, self._age = generator, None, None, False, 0.0
+        self._generator = generator
+        self._task: _Task | None = None
+        self._generated: GeneratedPath | None = None
+        self._outdated, self._age = False, 0.0
         plan = replace(settings.plan, avoid=False, search=None)
         super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
 
     def go(
         self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
     ) -> None:
-        """A leg along a path that begins about where the arm is: it is what is shown, and its end is the goal."""
+        """See `ReactivePlanner`: the path, from about where the arm is, is the demonstrated path, its end the goal."""
         super().go(path, exact=exact, detours=detours)
-        self._leg, self._made = (path, path[-1], guide_index(path, 0.0)), None
+        self._task, self._generated = _Task(path, path[-1], guide_index(path, 0.0)), None
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
-        """A leg as it was planned, made anew from exactly where the arm is."""
+        """See `Follower`: as planned, with the path generated anew from the present pose of the arm."""
         super().go(plan.path, exact=exact)
-        assert plan.request.demonstrated is not None
-        self._leg, self._made = (plan.request.demonstrated, plan.request.goal, plan.guide), None
+        self._task, self._generated = _Task(plan.request.demonstrated, plan.request.goal, plan.guide), None
 
     def stop(self) -> None:
         """See `ReactivePlanner`."""
         super().stop()
-        self._leg = None
+        self._task = self._generated = None
 
     def step(self, q: ArrayLike) -> Command:
         """See `ReactivePlanner`."""
-        if self._leg is not None and self._made is None:
-            self._restart(self._begun(self._leg, np.asarray(q, dtype=np.float64)).path)
-        elif self._made is not None and self._generator.avoids:
-            self._renew()
+        motion = self.motion
+        if motion is not None and self._generated is None:
+            self._begin(motion, np.asarray(q, dtype=np.float64))
+        elif motion is not None and self._generator.avoids:
+            self._renew(motion)
         return super().step(q)
 
-    def _begun(self, leg: tuple[PosePath, Pose, int], q: np.ndarray) -> GeneratedPath:
-        shown, goal, guide = leg
-        made = self._generator.make(shown, self.arm.fk(q), goal, guide, self._near())
-        self._made, self._plan_now, self._old, self._age = made, False, False, 0.0
-        return made
+    def _begin(self, motion: MotionState, q: np.ndarray) -> None:
+        assert self._task is not None
+        shown, goal, guide = self._task
+        self._generated = self._generator.make(shown, self.arm.fk(q), goal, guide, self._near())
+        self._outdated, self._age, motion.plan_now = False, 0.0, False
+        motion.pursue(self._generated.path, detour=False)
 
-    def _renew(self) -> None:
-        """The rest of the path anew, if something has moved since and it is time."""
+    def _renew(self, motion: MotionState) -> None:
+        """Generate the rest of the path anew, if an obstacle has moved since and it is time."""
         self._age += self.settings.plan.motion.dt
-        if (self._old or self._moving) and self._age >= RENEWED:
-            assert self._made is not None
-            index = min(int(self._pursuit_state[INDEX]), len(self._made.path) - 1)
-            self._made = self._generator.renewed(self._made, index, self._near())
-            self._path, self._old, self._age = self._made.path, False, 0.0
+        if (self._outdated or self._moving) and self._age >= RENEWED:
+            assert self._generated is not None
+            index = min(int(motion.pursuit[PURSUIT_STATE.reference]), len(self._generated.path) - 1)
+            self._generated = self._generator.renewed(self._generated, index, self._near())
+            motion.path, self._outdated, self._age = self._generated.path, False, 0.0
 
     def _near(self) -> ToolObstacles:
         return ToolObstacles.of(self.arm, self.body, self._obstacles, self._known_allowed(self._obstacles))
 
     def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
-        self._plan_now, self._old = False, True
+        assert self.motion is not None
+        self.motion.plan_now, self._outdated = False, True

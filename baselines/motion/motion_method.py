@@ -1,7 +1,7 @@
-"""The seam between a task's program and how a leg is moved: plans in, plans followed.
+"""The interface between a task's program and the method of moving: motions are planned, and plans followed.
 
-A program says from where to where, along what, holding what, what may be touched. A mover plans such a leg and
-follows it. The method's own is `SCREW`; the others of the comparison are in `opponents`.
+A program states start, goals, demonstrated segment, held object and allowed contacts. A motion method plans such a
+motion and follows it. The project's own method is `SCREW`; the baselines are in `baseline_motions`.
 """
 
 from __future__ import annotations
@@ -12,83 +12,69 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle
-from ...planner.imitation.tsia import GUIDE_START, final_path, guide_index
-from ...planner.planning.plan import NextMotion, Plan
-from ...planner.planning.planner import Planner
-from ...planner.planning.settings import PlanSettings
-from ...planner.reactive.command import Command, ReactiveSettings
-from ...planner.reactive.reactive_planner import ReactivePlanner
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner import (
+    Arm,
+    Body,
+    Command,
+    NextMotion,
+    Obstacle,
+    Plan,
+    Planner,
+    PlanSettings,
+    Pose,
+    PosePath,
+    ReactivePlanner,
+    ReactiveSettings,
+    final_path,
+    guide_index,
+)
+from ...planner.imitation.tsia import GUIDE_START
+from ...planner.planning.plan import MotionPlanner
 
 DIRECT, ESCAPE, PATH, JOINTS = "direct", "escape", "path", "joints"
-"""Of `Plan.how`: the last two are to be followed as they are."""
+"""Values of `Plan.how`; plans of the last two kinds are followed as planned."""
 MADE = (PATH, JOINTS)
 
 
-class MotionPlanner(Protocol):
-    """Answers what `planner.planning.Planner` answers."""
-
-    arm: Arm
-    body: Body
-
-    def plan(
-        self,
-        demonstrated: PosePath,
-        start: ArrayLike,
-        goal: Pose,
-        obstacles: Sequence[Obstacle] = (),
-        *,
-        allowed: Sequence[tuple[str, str]] = (),
-        leaving: PosePath | None = None,
-        next_motion: NextMotion | None = None,
-        seed: int = 0,
-    ) -> Plan:
-        """Plan a leg; see `Planner.plan`."""
-        ...
-
-
 class Follower(Protocol):
-    """Does what `planner.reactive.ReactivePlanner` does."""
+    """Interface of `planner.reactive.ReactivePlanner`."""
 
     body: Body
     settings: ReactiveSettings
 
     def hold(self, body: Body) -> None:
-        """The body from now on; see `ReactivePlanner.hold`."""
+        """Set the body; see `ReactivePlanner.hold`."""
         ...
 
     def see(self, obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]] = ()) -> None:
-        """What is around now; see `ReactivePlanner.see`."""
+        """See `ReactivePlanner.see`: set the present obstacles and allowed contacts."""
         ...
 
     def go(
         self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
     ) -> None:
-        """Follow a path to its end; see `ReactivePlanner.go`."""
+        """See `ReactivePlanner.go`: follow a path to its end."""
         ...
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
-        """Follow a plan that is to be followed as it is; see `ReactivePlanner.follow`."""
+        """See `ReactivePlanner.follow`: follow a plan without replanning."""
         ...
 
     def stop(self) -> None:
-        """No leg; see `ReactivePlanner.stop`."""
+        """End the motion; see `ReactivePlanner.stop`."""
         ...
 
     def step(self, q: ArrayLike) -> Command:
-        """The command for joints q; see `ReactivePlanner.step`."""
+        """Return the command for joints q (dof,); see `ReactivePlanner.step`."""
         ...
 
 
 class Relative(NamedTuple):
-    """The motion of one hand seen from another.
+    """Motion of one hand in the frame of another.
 
     Attributes:
-        path: from where it is now, to the end of what was shown.
-        tail: how many of its last poses belong to the task; before, there is only the way to them.
+        path: from the present relative pose to the end of the demonstrated one.
+        tail: number of last poses that belong to the task; the poses before are the approach.
     """
 
     path: PosePath
@@ -96,49 +82,61 @@ class Relative(NamedTuple):
 
 
 class MotionMethod(Protocol):
-    """How a leg is moved."""
+    """Method of executing a motion."""
 
     def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> MotionPlanner:
-        """What plans legs."""
+        """Create a planner of motions.
+
+        Args:
+            arm: the arm.
+            body: its capsules, held objects included.
+            settings: see `PlanSettings`.
+        """
         ...
 
     def follower(self, arm: Arm, body: Body, settings: ReactiveSettings) -> Follower:
-        """What follows them."""
+        """Create a follower of motions.
+
+        Args:
+            arm: the arm.
+            body: its capsules, held objects included.
+            settings: see `ReactiveSettings`.
+        """
         ...
 
     def skipped(self, done: int) -> int:
-        """How many poses of a segment are left out that has been begun before the leg, as `MotionChoice.done` says."""
+        """Return the number of poses to skip of a segment already begun, see `MotionChoice.done`."""
         ...
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """The same for what one hand does seen from another, far from obstacles.
+        """Return the relative motion of two hands, far from obstacles.
 
         Args:
-            shown: the relative path to its end.
-            start: the relative pose now.
+            shown: the demonstrated relative path to its end.
+            start: the present relative pose.
         """
         ...
 
     def dual_arm_path(
         self, arms: Sequence[Arm], q: np.ndarray, ends: Sequence[Pose], seen: Callable[[], np.ndarray], dt: float
     ) -> np.ndarray | str | None:
-        """A way of two arms through joint space; None: they move along their paths.
+        """Plan a path of two arms through joint space; None: the arms move along their paths.
 
         Args:
             arms: the arms.
-            q: (2, dof) joints now.
-            ends: where the two tcps must end.
-            seen: gives both arms among obstacles, see `planner.robot_arrays`.
+            q: (2, dof) present joints [rad].
+            ends: goals of the two tcps.
+            seen: returns both arms among obstacles, see `planner.collision.robot_arrays`.
             dt: seconds per tick.
 
         Returns:
-            (t, 2, dof) joints at every tick, or why there is no way.
+            (t, 2, dof) joints at every tick, or the reason of failure.
         """
         ...
 
 
 class ScrewMotion:
-    """TSIA, REPET, the search in joint space, the safety layer; see `Planner` and `ReactivePlanner`."""
+    """TSIA, REPET, search in joint space and safety layer; see `Planner` and `ReactivePlanner`."""
 
     def planner(self, arm: Arm, body: Body, settings: PlanSettings) -> MotionPlanner:
         """See `MotionMethod`."""
@@ -149,7 +147,7 @@ class ScrewMotion:
         return ReactivePlanner(arm, body, settings)
 
     def skipped(self, done: int) -> int:
-        """None: the guiding pose is behind them, at a fraction of the whole."""
+        """Return 0: the guiding pose, at a fraction of the whole, lies beyond the poses already done."""
         return 0
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
@@ -158,7 +156,7 @@ class ScrewMotion:
         return Relative(final_path(start, shown, guide), len(shown) - guide)
 
     def dual_arm_path(self, arms, q, ends, seen, dt) -> None:
-        """Along their paths."""
+        """See `MotionMethod`: the arms follow their paths."""
 
 
 SCREW = ScrewMotion()

@@ -1,6 +1,6 @@
-"""Path makers: a demonstrated path, a start, a goal and what is near in, a path out.
+"""Path generators: from a demonstrated path, a start, a goal and nearby obstacles to a path.
 
-Two of them here: TSIA with position and orientation interpolated apart, and the demonstration replayed.
+This module has two: TSIA with decoupled interpolation of position and orientation, and replay of the demonstration.
 """
 
 from __future__ import annotations
@@ -11,18 +11,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...planner import Pose, PosePath, imitated_path
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
-from ...planner.imitation.tsia import BLEND_STEP, LEAST_STEP, STILL, imitated_path
+from ...planner.geometry.pose import METERS_PER_RADIAN
+from ...planner.imitation.tsia import BLEND_STEP, LEAST_STEP, STILL
 from .tool_obstacles import ToolObstacles
 
 
 class GeneratedPath(NamedTuple):
-    """A path as made.
+    """A generated path.
 
     Attributes:
-        path: from the start; where its maker gave up, it ends before the goal.
-        states: what the maker needs to go on from each pose; () where it needs nothing.
+        path: from the start; ends before the goal where generation failed.
+        states: data to continue generation from each pose; () if not needed.
     """
 
     path: PosePath
@@ -30,11 +31,11 @@ class GeneratedPath(NamedTuple):
 
 
 class PathGenerator(ABC):
-    """Makes paths of the tcp.
+    """Generator of tcp paths.
 
     Attributes:
-        guided: the blend ends at a guiding pose; False: there is none.
-        avoids: it looks at obstacles, and goes on otherwise when they have moved.
+        guided: True: the blend ends at a guiding pose.
+        avoids: True: obstacles are avoided, and the path is renewed when they have moved.
     """
 
     guided = False
@@ -42,23 +43,29 @@ class PathGenerator(ABC):
 
     @abstractmethod
     def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
-        """A path.
+        """Generate a path.
 
         Args:
-            shown: the demonstrated segment, where it was shown.
-            start: of the tcp.
+            shown: the demonstrated segment, in its original place.
+            start: present pose of the tcp.
             goal: of the tcp.
-            guide: index in `shown` of the guiding pose.
-            near: what is around the tool.
+            guide: index of the guiding pose in `shown`.
+            near: obstacles around the tool.
         """
 
     def renewed(self, made: GeneratedPath, index: int, near: ToolObstacles) -> GeneratedPath:
-        """The path with what follows pose `index` made anew; only of a maker that avoids."""
+        """Generate anew the part of a path after a pose; for generators that avoid obstacles.
+
+        Args:
+            made: the path.
+            index: of the pose.
+            near: obstacles around the tool now.
+        """
         return made
 
 
 class Decoupled(PathGenerator):
-    """TSIA with lerp and slerp in place of ScLERP: position and orientation of the blend move apart."""
+    """TSIA with lerp and slerp in place of ScLERP: position and orientation of the blend are decoupled."""
 
     guided = True
 
@@ -71,9 +78,9 @@ class Decoupled(PathGenerator):
 
 
 class Replay(PathGenerator):
-    """The demonstration moved rigidly to the goal, and a straight way to its beginning.
+    """The demonstration moved rigidly to the goal, after a straight path to its beginning.
 
-    What MimicGen (Mandlekar et al. 2023) does to make data of one segment.
+    This is how MimicGen (Mandlekar et al. 2023) generates data of one segment.
     """
 
     def make(self, shown: PosePath, start: Pose, goal: Pose, guide: int, near: ToolObstacles) -> GeneratedPath:
@@ -83,7 +90,13 @@ class Replay(PathGenerator):
 
 
 def straight_path(start: Pose, end: Pose, step: float) -> PosePath:
-    """Positions on a straight line, orientations by slerp, at most `step` [m] of screw length apart."""
+    """Sample a straight line of positions with orientations by slerp, both ends included.
+
+    Args:
+        start: first pose.
+        end: last pose.
+        step: largest path length [m] between neighbors.
+    """
     distance, angle = start.distance_to(end)
     tau = np.linspace(0.0, 1.0, max(1, math.ceil(math.hypot(distance, METERS_PER_RADIAN * angle) / step)) + 1)
     turned = dq.sclerp(_turn(start), _turn(end), tau)[:, :4]

@@ -1,9 +1,9 @@
-"""TSIA in an artificial potential field: the reference pulls, obstacles push, online and without looking ahead.
+"""TSIA in an artificial potential field: the reference pulls, obstacles push, online and without lookahead.
 
-The field is Khatib's (1986): `strength (i/room - 1) (i/slack)^2` along the normal, i the influence, for the closest
-points of tool and obstacle; near the goal it fades (Ge and Cui 2000): else a goal beside an obstacle could not be
-reached. As in a tree of REPET only the translation is deflected. Where pull and push are equal it stands still:
-a local minimum.
+The field is Khatib's (1986): `strength (i/slack - 1) (i/slack)^2` along the normal, i the influence, for the closest
+points of tool and obstacle; near the goal the field fades (Ge and Cui 2000), or a goal beside an obstacle would be
+unreachable. As in a REPET tree, only the translation is deflected. Where pull and push balance, the motion stops in a
+local minimum.
 """
 
 from __future__ import annotations
@@ -12,31 +12,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...planner.errors import BadOption
+from ...planner import Pose, PosePath, final_path, imitated_path
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.imitation.tsia import final_path, imitated_path
+from ...planner.ranges import check_ranges
 from .path_generators import GeneratedPath, PathGenerator
 from .tool_obstacles import ToolObstacles
 
 MIN_CLEARANCE = 1e-3
-"""Room [m] below which the push does not grow any more."""
+"""Slack [m] below which the push no longer grows."""
 ARRIVED = 5e-4
-"""Offset [m] from the reference that counts as none."""
+"""Offset [m] from the reference that counts as zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class FieldSettings:
-    """The field.
+    """Settings of the potential field.
 
     Attributes:
-        pull: share of the offset from the reference that is taken back in a step.
-        strength: of the push [m] per step: four times that much at half the influence.
-        influence: room [m] at which an obstacle begins to push.
-        fade: distance [m] to the goal from which on the push fades: of the tool, and of the reference where the
-            obstacle belongs to the task, which is near the goal because it was there when it was shown.
+        pull: fraction of the offset from the reference removed per step.
+        strength: of the push [m] per step: four times this at half the influence.
+        influence: slack [m] at which an obstacle begins to push.
+        fade: distance [m] to the goal below which the push fades: distance of the tool, or of the reference if the
+            obstacle belongs to the task and was near the goal in the demonstration too.
         most: largest change of the offset in a step [m].
-        patience: steps that it may take more than the reference has poses.
+        patience: largest number of steps in excess of the reference's poses.
     """
 
     pull: float = 0.2
@@ -47,15 +46,16 @@ class FieldSettings:
     patience: int = 200
 
     def __post_init__(self):
-        for name in ("pull", "strength", "influence", "fade", "most"):
-            if not 0.0 < getattr(self, name) <= 1.0:
-                raise BadOption(name, f"{getattr(self, name)} is not in (0, 1]")
-        if not 0 <= self.patience <= 100_000:
-            raise BadOption("patience", f"{self.patience} is not from 0 to 100000")
+        check_ranges(self, "(0, 1]", "pull", "strength", "influence", "fade", "most")
+        check_ranges(self, "[0, 100000]", "patience")
 
 
 class Potential(PathGenerator):
-    """The TSIA path, deflected by a potential field step by step; where nothing is near, the TSIA path itself."""
+    """The TSIA path, deflected by a potential field step by step; without obstacles nearby, the TSIA path itself.
+
+    Args:
+        settings: see `FieldSettings`.
+    """
 
     guided = True
     avoids = True
@@ -75,7 +75,7 @@ class Potential(PathGenerator):
         return self._made(states[-1][0], list(made.path.dqs[: index + 1]), states, near)
 
     def _made(self, reference: PosePath, rows: list, states: list, near: ToolObstacles) -> GeneratedPath:
-        """Go on from the last state: (reference, index in it, offset from it (3,))."""
+        """Continue from the last state: (reference, index of its pose, offset from that pose (3,) [m])."""
         _, index, offset = states[-1]
         last = len(reference) - 1
         for _ in range(last - index + self.settings.patience):
@@ -90,7 +90,7 @@ class Potential(PathGenerator):
         return GeneratedPath(PosePath(np.array(rows)), tuple(states))
 
     def _change(self, reference: PosePath, index: int, offset: np.ndarray, near: ToolObstacles) -> np.ndarray:
-        """Of the offset, in one step: the pull of the reference and the push of what is near."""
+        """Return the change (3,) [m] of the offset in a step: pull of the reference plus push of nearby obstacles."""
         settings, position = self.settings, dq.translation(reference.dqs[index])
         change = -settings.pull * offset
         goal = dq.translation(reference.dqs[-1])
@@ -102,7 +102,7 @@ class Potential(PathGenerator):
 
 
 def _shifted(pose: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """A dual quaternion (8,) moved in the world; the same bits where the offset is none."""
+    """Translate a dual quaternion (8,) in the world; bit-identical if the offset is zero."""
     if not offset.any():
         return pose
     return dq.mul(dq.from_position_quaternion(offset, np.array([1.0, 0.0, 0.0, 0.0])), pose)

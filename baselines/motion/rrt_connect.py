@@ -1,7 +1,7 @@
-"""RRT-Connect (Kuffner and LaValle 2000) by OMPL in the joints of one arm or two, every edge proven clear.
+"""RRT-Connect (Kuffner and LaValle 2000) by OMPL in the joints of one arm or two, with certified edges.
 
-No demonstration of the way: it goes to wherever the inverse kinematics of the goal leads. OMPL draws the samples and
-grows the trees; whether an edge is clear is asked of the planner's own certificate: nothing thin is jumped over.
+The demonstration is ignored: the path leads to a posture found by the inverse kinematics of the goal. OMPL draws the
+samples and grows the trees; edges are checked by the planner's own certificate, so thin obstacles are not missed.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from typing import Any
 import numpy as np
 
 from ...planner.collision.clearance import slack_at
-from ...planner.errors import BadOption
 from ...planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
+from ...planner.ranges import check_ranges
 from ..extras import needed
 
 
 @dataclass(frozen=True, slots=True)
 class RrtSettings:
-    """A search.
+    """Settings of a search.
 
     Attributes:
-        budget: edges that may be looked at before it is given up: about what fits into a second. A count, not a
-            clock, so that a run can be repeated.
+        budget: number of edge checks before the search fails: about one second's worth. A count instead of a time limit
+            keeps runs reproducible.
         step: longest edge [rad].
-        goals: joint postures of the goal that are aimed at, at most.
-        seeds: starts of the inverse kinematics; twice as many, three times over, where none leads to a clear posture.
-        approach: length [m] of the straight end of a way to where something must be touched: along the fingers
-            to a grasp, from above to a place; 0: none.
-        shortcuts: tries to leave out points of what was found.
-        speed: of the largest joint speed.
-        margin: distance [rad] that postures keep from the joint limits.
+        goals: largest number of goal postures.
+        seeds: starts of the inverse kinematics; doubled up to three times while no start leads to a clear posture.
+        approach: length [m] of the straight end of a path to a contact: along the fingers to a grasp, from above to a
+            placement; 0: none.
+        shortcuts: attempts to remove points of the path found.
+        speed: fraction of the largest joint speed.
+        margin: distance [rad] of postures from the joint limits.
     """
 
     budget: int = 30_000
@@ -46,15 +46,9 @@ class RrtSettings:
     margin: float = 0.05
 
     def __post_init__(self):
-        for name in ("budget", "goals", "seeds"):
-            if not 1 <= getattr(self, name) <= 10**7:
-                raise BadOption(name, f"{getattr(self, name)} is not from 1 to ten million")
-        for name in ("step", "speed"):
-            if not 0.0 < getattr(self, name) <= 10.0:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number up to 10")
-        for name in ("approach", "shortcuts", "margin"):
-            if not 0 <= getattr(self, name) <= 1000:
-                raise BadOption(name, f"{getattr(self, name)} is not from 0 to 1000")
+        check_ranges(self, "[1, 10000000]", "budget", "goals", "seeds")
+        check_ranges(self, "(0, 10]", "step", "speed")
+        check_ranges(self, "[0, 1000]", "approach", "shortcuts", "margin")
 
 
 def joint_path(
@@ -66,16 +60,19 @@ def joint_path(
     settings: RrtSettings,
     seed: int = 0,
 ) -> np.ndarray | None:
-    """Points (k, n) of a clear way in joint space to the goal that is met first; None if none was found.
+    """Search a clear path in joint space to the first goal that is reached.
 
     Args:
-        g: the robot among obstacles, see `planner.robot_arrays`.
-        low: (n,) joint limits [rad].
-        high: same.
-        start: (n,) joints.
-        goals: (n,) joints each, clear.
+        g: the robot among obstacles, see `planner.collision.robot_arrays`.
+        low: (n,) lower joint limits [rad].
+        high: (n,) upper joint limits [rad].
+        start: (n,) joints [rad].
+        goals: (n,) joints each [rad], clear.
         settings: see `RrtSettings`.
         seed: of OMPL's random numbers.
+
+    Returns:
+        Points (k, n) of the path [rad]; None if no path was found.
 
     Raises:
         MissingExtra: OMPL is not installed.
@@ -94,7 +91,12 @@ def joint_path(
 
 
 def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Joints at every tick along points (k, n), no joint moving more than its step (n,) in a tick."""
+    """Return joints (t, n) at every tick along a path.
+
+    Args:
+        points: (k, n) points of the path [rad].
+        step: (n,) largest change of each joint per tick [rad].
+    """
     rows = [points[:1]]
     for start, end in pairwise(points):
         count = max(1, int(np.ceil((np.abs(end - start) / step).max())))
@@ -103,7 +105,12 @@ def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
 
 
 def joint_space(low: np.ndarray, high: np.ndarray) -> Any:
-    """OMPL's space of joints between limits (n,); from now on OMPL says nothing."""
+    """Return OMPL's space of joints between limits, and silence OMPL.
+
+    Args:
+        low: (n,) lower joint limits [rad].
+        high: (n,) upper joint limits [rad].
+    """
     ob: Any = needed("ompl.base", "ompl")
     util: Any = needed("ompl.util", "ompl")
     util.setLogLevel(util.LogLevel.LOG_NONE)
@@ -116,7 +123,12 @@ def joint_space(low: np.ndarray, high: np.ndarray) -> Any:
 
 
 def informed(space: Any, g: np.ndarray) -> Any:
-    """What OMPL knows of a space, with the planner's own answer to which states are clear; yet to be set up."""
+    """Return OMPL's information on a space, with the planner's own clearance check; its setup is left to the caller.
+
+    Args:
+        space: as returned by `joint_space`.
+        g: the robot among obstacles, see `planner.collision.robot_arrays`.
+    """
     ob: Any = needed("ompl.base", "ompl")
     information, dof = ob.SpaceInformation(space), space.getDimension()
     information.setStateValidityChecker(lambda state: slack_at(g, _joints(state, dof), 0.0, 0.1) >= 0.0)
@@ -124,7 +136,12 @@ def informed(space: Any, g: np.ndarray) -> Any:
 
 
 def state_of(space: Any, q: np.ndarray) -> Any:
-    """Joints (n,) as a state of OMPL's."""
+    """Return joints as a state of OMPL's.
+
+    Args:
+        space: as returned by `joint_space`.
+        q: (n,) joints [rad].
+    """
     state = space.allocState()
     for k, value in enumerate(q):
         state[k] = float(value)
@@ -134,7 +151,7 @@ def state_of(space: Any, q: np.ndarray) -> Any:
 class _Search:
     """OMPL's objects for one robot among obstacles.
 
-    What OMPL calls back knows nothing of these objects: a ring of references through it would never be freed.
+    OMPL's callbacks hold no reference to these objects: a reference cycle through OMPL would never be freed.
     """
 
     def __init__(self, g: np.ndarray, low: np.ndarray, high: np.ndarray, settings: RrtSettings):
@@ -148,8 +165,8 @@ class _Search:
         self._information.setup()
 
     def solved(self, start: np.ndarray, goals: Sequence[np.ndarray], seed: int) -> np.ndarray | None:
-        """Points (k, n) of a way, None if the budget ran out."""
-        # what is made from here on draws from this seed, whatever was drawn before
+        """Return the points (k, n) of a path, or None if the budget is exhausted."""
+        # planners created from here on draw from this seed, independent of earlier draws
         self._util.RNG.setSeed(seed % 2_000_000_000 + 1)
         problem, goal = self._ob.ProblemDefinition(self._information), self._ob.GoalStates(self._information)
         problem.addStartState(state_of(self._space, start))
@@ -168,10 +185,11 @@ class _Search:
 
 
 def _edges(ob: Any, information: Any, g: np.ndarray, dof: int, asked: list[int]) -> Any:
-    """OMPL's question whether an edge is clear, answered by the certificate; counts how often it is asked."""
+    """Return OMPL's motion validator, backed by the certificate; the validator counts its calls."""
 
     class Edges(ob.MotionValidator):
         def checkMotion(self, start, end, last_valid=None):
+            """See OMPL's `MotionValidator`."""
             asked[0] += 1
             return bool(joint_edge_is_clear(g, _joints(start, dof), _joints(end, dof)))
 

@@ -1,4 +1,4 @@
-"""Legs by RRT-Connect: made when they begin, followed as they are; of one arm, and of two at once."""
+"""Motions by RRT-Connect, of one arm or two: planned when they begin, followed without replanning."""
 
 from __future__ import annotations
 
@@ -9,16 +9,20 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...planner import (
+    Arm,
+    Body,
+    Command,
+    NextMotion,
+    Obstacle,
+    PlanSettings,
+    Pose,
+    PosePath,
+    ReactivePlanner,
+    ReactiveSettings,
+)
 from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle
-from ...planner.planning.plan import NextMotion
-from ...planner.planning.settings import PlanSettings
-from ...planner.reactive.command import FAILED, Command, ReactiveSettings
-from ...planner.reactive.reactive_planner import ReactivePlanner
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
 from ..extras import needed
 from .motion_method import SCREW, Follower, MotionMethod, MotionPlanner, Relative
 from .rrt_connect import RrtSettings, joint_path, timed
@@ -27,7 +31,14 @@ from .settings import ProgramSettings
 
 
 class RrtFollower(ReactivePlanner):
-    """Follows ways through joint space, made from where the arm is; nothing is planned anew."""
+    """Follower of paths through joint space, planned from the present joints and never replanned.
+
+    Args:
+        arm: the arm.
+        body: its capsules, held objects included.
+        settings: see `ReactiveSettings`; detours, search and prediction are switched off.
+        sampling: see `RrtSettings`.
+    """
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, sampling: RrtSettings):
         self._sampling, self._goal = sampling, None
@@ -37,7 +48,7 @@ class RrtFollower(ReactivePlanner):
     def go(
         self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
     ) -> None:
-        """A leg to the end of a path."""
+        """See `ReactivePlanner`: only the end of the path matters."""
         super().go(path, exact=exact)
         self._goal = path[-1]
 
@@ -48,25 +59,34 @@ class RrtFollower(ReactivePlanner):
 
     def step(self, q: ArrayLike) -> Command:
         """See `ReactivePlanner`."""
-        if self._goal is not None and self._joints is None:
+        motion = self.motion
+        if motion is not None and self._goal is not None:
             planner = RrtPlanner(self.arm, self.body, self.settings.plan, self._sampling)
             joints = np.asarray(q, dtype=np.float64)
             still = [each for each in self._obstacles if not each.velocity.any()]
-            joints_or_reason = planner.joints_or_reason(joints, self._goal, still, self._known_allowed(still))
+            found = planner.joints_or_reason(joints, self._goal, still, self._known_allowed(still))
             self._goal = None
-            if isinstance(joints_or_reason, str):
-                self.state, self.reason = FAILED, "blocked" if joints_or_reason == NO_PATH else joints_or_reason
-                self.detail = "no way through joint space was found"
+            if isinstance(found, str):
+                motion.fail("blocked" if found == NO_PATH else found, "no way through joint space was found")
             else:
-                self._joints, self._done, self._plan_now = joints_or_reason, 0, False
+                motion.plan_now = False
+                motion.track(found, motion.path)
         return super().step(q)
 
     def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
-        self._plan_now = False
+        assert self.motion is not None
+        self.motion.plan_now = False
 
 
 class RrtMotion:
-    """Legs by RRT-Connect."""
+    """Motions by RRT-Connect.
+
+    Args:
+        sampling: see `RrtSettings`.
+
+    Raises:
+        MissingExtra: OMPL is not installed.
+    """
 
     def __init__(self, sampling: RrtSettings):
         needed("ompl.base", "ompl")
@@ -81,11 +101,11 @@ class RrtMotion:
         return RrtFollower(arm, body, settings, self._sampling)
 
     def skipped(self, done: int) -> int:
-        """None: it looks at the end only."""
+        """Return 0: only the end of a segment matters."""
         return 0
 
     def relative(self, shown: PosePath, start: Pose) -> Relative:
-        """See `MotionMethod`; only its end says something."""
+        """See `MotionMethod`; only the end of the path matters."""
         return SCREW.relative(shown, start)
 
     def dual_arm_path(
@@ -115,7 +135,7 @@ class RrtMotion:
 
 @dataclass(frozen=True, slots=True)
 class RrtPolicySettings(ProgramSettings):
-    """Of `rrt`.
+    """Settings of `rrt`.
 
     Attributes:
         sampling: see `RrtSettings`.

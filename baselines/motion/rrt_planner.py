@@ -1,4 +1,4 @@
-"""Plans of legs by sampling in joint space: to an inverse-kinematics posture of the goal, by any clear way."""
+"""Plans by sampling in joint space: to an inverse-kinematics posture of the goal, by any clear path."""
 
 from __future__ import annotations
 
@@ -7,41 +7,43 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from ...planner import Arm, Body, Obstacle, Plan, PlanRequest, PlanSettings, Pose, PosePath, imitated_path
 from ...planner.control.inverse_kinematics import inverse_kinematics
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle
-from ...planner.imitation.tsia import imitated_path, screw_path
-from ...planner.planning.plan import NextMotion, Plan, PlanRequest
+from ...planner.imitation.tsia import screw_path
+from ...planner.planning.plan import MotionPlanner
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
-from ...planner.planning.settings import PlanSettings
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
 from .motion_method import JOINTS
 from .rrt_connect import RrtSettings, joint_path, timed
 
 NO_PATH, NO_POSTURE = "no way found", "ik_or_limit"
 MORE = 3
-"""How often the starts of the inverse kinematics are doubled."""
+"""Number of doublings of the starts of the inverse kinematics."""
 APPROACH_STEP = 0.01
-"""Way [m] between two postures of a straight end."""
+"""Path length [m] between two postures of a straight end."""
 
 
 class Posture(NamedTuple):
-    """A posture of a goal and how it is come to.
+    """A posture of a goal and its approach.
 
     Attributes:
-        first: (dof,) where the search has to lead.
-        rest: (k, dof) postures from there to the goal.
+        first: (dof,) goal of the search [rad].
+        rest: (k, dof) postures from there to the goal [rad].
     """
 
     first: np.ndarray
     rest: np.ndarray
 
 
-class RrtPlanner:
-    """Plans legs of one arm by RRT-Connect; see `motion_method.MotionPlanner`."""
+class RrtPlanner(MotionPlanner):
+    """Planner of one arm's motions by RRT-Connect; see `planner.planning.plan.MotionPlanner`.
+
+    Args:
+        arm: the arm.
+        body: its capsules, held objects included.
+        settings: see `PlanSettings`.
+        sampling: see `RrtSettings`.
+    """
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, sampling: RrtSettings):
         self.arm, self.body, self.settings, self.sampling = arm, body, settings, sampling
@@ -49,36 +51,37 @@ class RrtPlanner:
         self._low = np.maximum(arm.lower, -np.pi) + sampling.margin
         self._high = np.minimum(arm.upper, np.pi) - sampling.margin
 
-    def plan(
-        self,
-        demonstrated: PosePath,
-        start: ArrayLike,
-        goal: Pose,
-        obstacles: Sequence[Obstacle] = (),
-        *,
-        allowed: Sequence[tuple[str, str]] = (),
-        leaving: PosePath | None = None,
-        next_motion: NextMotion | None = None,
-        seed: int = 0,
-    ) -> Plan:
-        """Plan a leg; see `Planner.plan`. Of what was demonstrated only its end is looked at."""
-        begun, q = time.perf_counter(), self.arm.checked(start)
-        asked = PlanRequest(self.arm, self.body, goal, tuple(obstacles), tuple(allowed), self.settings, demonstrated)
+    def answer(self, request: PlanRequest) -> Plan:
+        """Plan a motion; of the demonstrated path only the end matters."""
+        begun, q = time.perf_counter(), self.arm.checked(request.start)
         joints, reason = q[None], ""
-        for end in [goal] if leaving is None else [leaving[-1], goal]:
-            joints_or_reason = self.joints_or_reason(joints[-1], end, obstacles, allowed, seed)
-            if isinstance(joints_or_reason, str):
-                joints, reason = q[None], joints_or_reason
+        for end in [request.goal] if request.leaving is None else [request.leaving[-1], request.goal]:
+            found = self.joints_or_reason(joints[-1], end, request.obstacles, request.allowed, request.seed)
+            if isinstance(found, str):
+                joints, reason = q[None], found
                 break
-            joints = np.vstack([joints, joints_or_reason[1:]])
+            joints = np.vstack([joints, found[1:]])
         rows = [*joints[: -1 : max(1, len(joints) // 100)], joints[-1]]
         path = PosePath(np.array([self.arm.fk(row).dq for row in rows]))
-        margin = min(self.arm.margin(row) for row in joints) if not reason else -np.inf
         return Plan(
-            joints, self.settings.motion.dt, reason, JOINTS, imitated_path(demonstrated, goal).dqs, path.dqs,
-            np.empty((0, 8)), 0, margin, 0, 1, time.perf_counter() - begun, asked,
+            joints=joints,
+            dt=self.settings.motion.dt,
+            reason=reason,
+            how=JOINTS,
+            imitated_poses=imitated_path(request.demonstrated, request.goal).dqs,
+            path_poses=path.dqs,
+            tree_rows=np.empty((0, 8)),
+            detours=0,
+            margin=min(self.arm.margin(row) for row in joints) if not reason else -np.inf,
+            changed=0,
+            tries=1,
+            seconds=time.perf_counter() - begun,
+            request=request,
+            arm=self.arm,
+            body=self.body,
+            settings=self.settings,
             imitated_share=0.0 if reason else 1.0,
-        )  # fmt: skip
+        )
 
     def joints_or_reason(
         self,
@@ -88,14 +91,25 @@ class RrtPlanner:
         allowed: Sequence[tuple[str, str]],
         seed: int = 0,
     ) -> np.ndarray | str:
-        """Joints (t, dof) at every tick from q to the goal, or why there are none."""
+        """Plan joints from a configuration to a goal.
+
+        Args:
+            q: (dof,) present joints [rad].
+            goal: of the tcp.
+            obstacles: around the arm.
+            allowed: allowed contacts, (body name, obstacle name).
+            seed: of OMPL's random numbers.
+
+        Returns:
+            Joints (t, dof) [rad] at every tick, or the reason of failure.
+        """
         distance = self.settings.safety.distance
         scene = PlanningScene(self._layout, checked_obstacles(obstacles), distance, allowed)
         strict = PlanningScene(self._layout, checked_obstacles(obstacles), distance)
         postures = self._postures(q, goal, scene, strict)
         if not postures:
             return NO_POSTURE
-        # what is touched on purpose is touched on the straight end only, if there is one
+        # allowed contacts are used on the straight end only, if there is one
         free = strict if min(strict.slack(each) for each in (q, *(p.first for p in postures))) >= 0.0 else scene
         firsts = [each.first for each in postures]
         points = joint_path(free.seen, self.arm.lower, self.arm.upper, q, firsts, self.sampling, seed)
@@ -106,7 +120,7 @@ class RrtPlanner:
         return timed(np.vstack([points, met.rest]), step)
 
     def _postures(self, q: np.ndarray, goal: Pose, scene: PlanningScene, strict: PlanningScene) -> list[Posture]:
-        """Clear postures of the goal, the nearest first; if there are any, those that touch on a straight end only."""
+        """Return clear postures of the goal, nearest first; preferably those with contacts on a straight end only."""
         rng, found, seeds = np.random.default_rng(0), [], self.sampling.seeds
         for k in range(seeds * 2**MORE):
             if found and k >= seeds:
@@ -122,7 +136,7 @@ class RrtPlanner:
         return (gentle or [Posture(each, nothing) for each in found])[: self.sampling.goals]
 
     def _ended(self, q: np.ndarray, goal: Pose, scene: PlanningScene, strict: PlanningScene) -> Posture | None:
-        """A posture with a straight end, if it touches something: along the fingers, or from above what is held."""
+        """Return a posture, with a straight end if in contact: along the fingers, or from above for a held object."""
         length = self.sampling.approach
         if strict.slack(q) >= 0.0:
             return Posture(q, np.empty((0, self.arm.dof)))

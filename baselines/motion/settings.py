@@ -1,35 +1,33 @@
-"""What a task's program needs to know, whoever moves the hand."""
+"""Settings of a task's program, common to all motion methods."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
-from ...envs.core.description import TaskDescription
-from ...planner.errors import BadOption
-from ...planner.planning.settings import MotionSettings, PlanSettings
-from ...planner.reactive.command import ReactiveSettings
-from ...planner.safety.safety_layer import SafetySettings
+from ...envs import TaskDescription
+from ...planner import MotionSettings, PlanSettings, ReactiveSettings, SafetySettings
+from ...planner.ranges import check_ranges
 from .motion_method import MotionMethod
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramSettings(ABC):
-    """How the demonstration becomes a program: the same for every policy, only how a leg is moved differs.
+    """Settings of the program derived from the demonstration: common to all policies; only the motion method differs.
 
     Attributes:
         motion: the motions; see `MotionSettings`.
         safety: the layer that keeps the arm clear; see `SafetySettings`.
-        resample: screw length [m] between the poses of a demonstrated segment; removes pauses and trembling
+        resample: path length [m] between the poses of a demonstrated segment; removes pauses and trembling
             from the rule that advances along the path.
-        trim: distance [m] to the end of the transfer at which its tail is cut, because people fumble there.
+        trim: distance [m] to the end of the transfer at which its tail is cut, because demonstrators fumble there.
         release_height: height [m] above rest at which a held object is released. Pressed on its support, a
             slightly tilted object is thrown aside when the fingers open.
         settle: seconds of standing still before the gripper moves, so that the servos catch up.
-        close: seconds given to closing.
-        open: seconds given to opening.
+        close: seconds for closing the gripper.
+        open: seconds for opening the gripper.
         drain: seconds of holding a glass tilted.
-        guard: True: the safety layer has the last word on every command.
+        guard: True: the safety layer filters every command.
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -44,28 +42,24 @@ class ProgramSettings(ABC):
     guard: bool = True
 
     def __post_init__(self):
-        for name in ("resample", "trim"):
-            if not getattr(self, name) > 0:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
-        for name in ("release_height", "settle", "close", "open", "drain"):
-            if getattr(self, name) < 0:
-                raise BadOption(name, f"{getattr(self, name)} is negative")
+        check_ranges(self, "(0, inf]", "resample", "trim")
+        check_ranges(self, "[0, inf]", "release_height", "settle", "close", "open", "drain")
 
     @property
     @abstractmethod
     def motion_method(self) -> MotionMethod:
-        """How a leg is moved."""
+        """Method of executing motions."""
 
     @property
     @abstractmethod
     def plan(self) -> PlanSettings:
-        """The settings as planners take them."""
+        """Settings for planners."""
 
     def visible_part(self, task: TaskDescription) -> TaskDescription:
-        """What of a task is looked at; all of it."""
+        """Return the part of a task this method may see (default: all)."""
         return task
 
     @property
     def reactive(self) -> ReactiveSettings:
-        """The settings as what follows a path takes them; a stalled motion gives up as `motion.pursuit` says."""
+        """Settings for followers; a stalled motion fails after the patience of `motion.pursuit`."""
         return ReactiveSettings(plan=self.plan, patience=self.motion.pursuit.patience)

@@ -1,8 +1,8 @@
-"""Legs as they would be moved if another frame of the hand were its tcp: level T.
+"""Motions executed as if another frame of the hand were the tcp: level T.
 
-The task's program stays in the true tcp's frame, which its fingers close along. What plans and follows a leg gets an
-arm whose tcp is elsewhere, and paths and goals as they are seen from there; what it answers is seen from the true tcp
-again. Screws do not care; what moves a point of the hand straight, and its orientation apart, moves another point.
+The task's program stays in the frame of the true tcp, along which the fingers close. Planner and follower of a motion
+get an arm with another tcp, and paths and goals converted to that frame; their results are converted back. Screw
+motions are invariant to this; methods that decouple position and orientation of the hand move differently.
 """
 
 from __future__ import annotations
@@ -12,71 +12,62 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...planner import Arm, Body, Command, NextMotion, Plan, PlanRequest, PlanSettings, Pose, PosePath, ReactiveSettings
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle
-from ...planner.planning.plan import NextMotion, Plan
-from ...planner.planning.settings import PlanSettings
-from ...planner.reactive.command import Command, ReactiveSettings
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
-from .motion_method import Follower, MotionMethod, MotionPlanner, Relative
+from ...planner.planning.plan import MotionPlanner
+from .motion_method import Follower, MotionMethod, Relative
 
 
 def seen_from(plan: Plan, arm: Arm, tcp_from_other: Pose) -> Plan:
-    """A plan with its poses those of another frame of the hand, which is the tcp of the given arm.
+    """Convert a plan's poses to another frame of the hand.
 
-    Its tree is left out: the planes of that are laid where the tcp was.
-    """
-    shown = plan.request.demonstrated
-    asked = plan.request._replace(
-        arm=arm,
-        goal=plan.request.goal @ tcp_from_other,
-        demonstrated=None if shown is None else shown.with_tool(tcp_from_other),
-    )
-    imitated, path = (dq.mul(poses, tcp_from_other.dq) for poses in (plan.imitated_poses, plan.path_poses))
-    return plan._replace(imitated_poses=imitated, path_poses=path, tree_rows=plan.tree_rows[:0], asked=asked)
-
-
-class ToolFramePlanner:
-    """Plans legs in another frame of the hand; see `motion_method.MotionPlanner`.
+    The escape tree is dropped: its planes refer to the original tcp.
 
     Args:
-        planner: of the arm whose tcp is that frame.
+        plan: the plan.
+        arm: the arm with the other frame as its tcp.
+        tcp_from_other: the other frame in the frame of the plan's tcp.
+    """
+    request = plan.request._replace(
+        demonstrated=plan.request.demonstrated.with_tool(tcp_from_other), goal=plan.request.goal @ tcp_from_other
+    )
+    imitated, path = (dq.mul(poses, tcp_from_other.dq) for poses in (plan.imitated_poses, plan.path_poses))
+    return plan._replace(
+        imitated_poses=imitated, path_poses=path, tree_rows=plan.tree_rows[:0], request=request, arm=arm
+    )
+
+
+class ToolFramePlanner(MotionPlanner):
+    """Planner of motions in another frame of the hand; see `planner.planning.plan.MotionPlanner`.
+
+    Args:
+        planner: of the arm with that frame as its tcp.
         arm: with the true tcp.
         tcp_from_tool: the frame.
     """
 
     def __init__(self, planner: MotionPlanner, arm: Arm, tcp_from_tool: Pose):
-        self.arm, self.body, self._planner, self._tool = arm, planner.body, planner, tcp_from_tool
+        self.arm, self.body, self.settings = arm, planner.body, planner.settings
+        self._planner, self._tool = planner, tcp_from_tool
 
-    def plan(
-        self,
-        demonstrated: PosePath,
-        start: ArrayLike,
-        goal: Pose,
-        obstacles: Sequence[Obstacle] = (),
-        *,
-        allowed: Sequence[tuple[str, str]] = (),
-        leaving: PosePath | None = None,
-        next_motion: NextMotion | None = None,
-        seed: int = 0,
-    ) -> Plan:
-        """Plan a leg; see `Planner.plan`."""
-        tool, away = self._tool, None if leaving is None else leaving.with_tool(self._tool)
-        plan = self._planner.plan(
-            demonstrated.with_tool(tool), start, goal @ tool, obstacles,
-            allowed=allowed, leaving=away, next_motion=_next_motion(next_motion, tool), seed=seed,
-        )  # fmt: skip
-        return seen_from(plan, self.arm, tool.inverse())
+    def answer(self, request: PlanRequest) -> Plan:
+        """Plan a motion; see `MotionPlanner`."""
+        tool, leaving = self._tool, request.leaving
+        there = request._replace(
+            demonstrated=request.demonstrated.with_tool(tool),
+            goal=request.goal @ tool,
+            leaving=None if leaving is None else leaving.with_tool(tool),
+            next_motion=_next_motion(request.next_motion, tool),
+        )
+        return seen_from(self._planner.answer(there), self.arm, tool.inverse())
 
 
 class ToolFrameFollower:
-    """Follows legs in another frame of the hand; see `motion_method.Follower`.
+    """Follower of motions in another frame of the hand; see `motion_method.Follower`.
 
     Args:
-        follower: of the arm whose tcp is that frame.
-        arm: this arm.
+        follower: of the arm with that frame as its tcp.
+        arm: that arm.
         tcp_from_tool: the frame.
     """
 
@@ -107,14 +98,14 @@ class ToolFrameFollower:
 
 
 class ToolFrameMotion:
-    """A mover whose legs are moved in another frame of the hand.
+    """A motion method applied in another frame of the hand.
 
-    With two hands this is the frame in which the way of the one is made, seen from the other; both follow it by their
+    With two hands, the relative path of one hand to the other is generated in this frame; both hands follow it by their
     true tcps.
 
     Args:
-        motion_method: how legs are moved.
-        tcp_from_tool: the frame; turned about the tcp's z axis at most, along which the sampler takes things.
+        motion_method: method of executing motions.
+        tcp_from_tool: the frame; rotated at most about the tcp's z axis, the grasping direction of the sampler.
     """
 
     def __init__(self, motion_method: MotionMethod, tcp_from_tool: Pose):

@@ -1,4 +1,4 @@
-"""What is near a tool: for policies that push away from obstacles where they are, instead of planning round them."""
+"""Obstacles near a tool: for methods that push away from present obstacles instead of planning around them."""
 
 from __future__ import annotations
 
@@ -7,26 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...planner.collision.clearance import GAP, KEEP, NORMAL, OTHER, find_near
-from ...planner.collision.edge_certificates import tool_arrays
-from ...planner.collision.robot_arrays import FRAMES, HEADER, N_NEAR, NEAR, WORLD, place_frames
-from ...planner.geometry.shapes import Obstacle, pack
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner import Arm, Body, Obstacle
+from ...planner.collision.capsule_placement import place_frames
+from ...planner.collision.clearance import find_near
+from ...planner.collision.edge_certificates import pose_tool, tool_arrays
+from ...planner.collision.robot_arrays import HEADER, NEAR_PAIR, ROW
+from ...planner.geometry.shapes import pack
+from ...planner.robot.body import BODY
 from ...planner.safety.safety_layer import contact_masks
 
 KNOWN_REACH = 0.01
-"""Distance [m] at which what belongs to the task (an obstacle with a margin of its own) begins to push."""
+"""Distance [m] at which an obstacle that belongs to the task (one with its own margin) begins to push."""
 
 
 class NearestObstacle(NamedTuple):
     """The nearest pair of the tool and an obstacle.
 
     Attributes:
-        slack: distance less the obstacle's own margin [m], negative inside.
-        reach: room at which that obstacle begins to push [m].
+        slack: distance minus the obstacle's own margin [m], negative inside.
+        reach: slack at which that obstacle begins to push [m].
         normal: (3,) unit, from the obstacle to the tool.
-        known: the obstacle belongs to the task.
+        known: True: the obstacle belongs to the task.
     """
 
     slack: float
@@ -36,11 +37,11 @@ class NearestObstacle(NamedTuple):
 
 
 class ToolObstacles:
-    """A tool among obstacles, asked where it is close to which.
+    """A tool among obstacles, for proximity queries.
 
     Args:
         tool: (m, 7) capsules that move with the tcp, see `Body.tool`.
-        obstacles: where they are now. One with a margin of its own belongs to the task.
+        obstacles: at present. An obstacle with its own margin belongs to the task.
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
     """
 
@@ -50,8 +51,15 @@ class ToolObstacles:
 
     @staticmethod
     def of(arm: Arm, body: Body, obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]]) -> ToolObstacles:
-        """The tool of an arm's body, with the contacts that are wanted."""
-        at_tool = np.flatnonzero(body.rows[:, 0] == arm.dof - 1)
+        """Take the tool from an arm's body, with its allowed contacts.
+
+        Args:
+            arm: the arm.
+            body: its capsules, held objects included.
+            obstacles: at present.
+            allowed: allowed contacts, (body name, obstacle name).
+        """
+        at_tool = np.flatnonzero(body.rows[:, BODY.frame] == arm.dof - 1)
         masks = [
             sum(1 << k for k, row in enumerate(at_tool) if mask >> int(row) & 1)
             for mask in contact_masks(body.names, obstacles, allowed)
@@ -59,7 +67,7 @@ class ToolObstacles:
         return ToolObstacles(body.tool(arm), obstacles, masks)
 
     def at(self, position: np.ndarray, quaternion: np.ndarray, reach: float) -> list[NearestObstacle]:
-        """What is within reach of the tool at a pose of the tcp.
+        """Return the nearest pair for each obstacle within reach of the tool at a pose of the tcp.
 
         Args:
             position: (3,) [m].
@@ -69,13 +77,14 @@ class ToolObstacles:
         if self.empty:
             return []
         work, least = self._work, {}
-        work[FRAMES, 3:6], work[FRAMES, 6:10] = position, quaternion
-        place_frames(work, WORLD)
+        pose_tool(work, position, quaternion)
+        place_frames(work, ROW.placed)
         find_near(work, reach)
-        first = int(work[HEADER, NEAR])
-        for row in work[first : first + int(work[HEADER, N_NEAR])]:
-            known = bool(row[KEEP] > 0.0)
-            slack, within = row[GAP] - row[KEEP], min(KNOWN_REACH, reach) if known else reach
-            if slack < within and (row[OTHER] not in least or slack < least[row[OTHER]].slack):
-                least[row[OTHER]] = NearestObstacle(float(slack), within, row[NORMAL : NORMAL + 3].copy(), known)
+        first = int(work[ROW.header, HEADER.first_near])
+        for row in work[first : first + int(work[ROW.header, HEADER.near])]:
+            known = bool(row[NEAR_PAIR.margin] > 0.0)
+            slack, other = row[NEAR_PAIR.distance] - row[NEAR_PAIR.margin], row[NEAR_PAIR.other]
+            within, normal = min(KNOWN_REACH, reach) if known else reach, slice(NEAR_PAIR.normal, NEAR_PAIR.t)
+            if slack < within and (other not in least or slack < least[other].slack):
+                least[other] = NearestObstacle(float(slack), within, row[normal].copy(), known)
         return list(least.values())

@@ -1,1 +1,1 @@
-"""What a task asks for, motion by motion."""
+"""Task programs: the sequence of motions each task requires."""

@@ -1,4 +1,4 @@
-"""One arm with its gripper as a program moves it: generators that yield an action per tick."""
+"""One arm and its gripper as moved by a program: generators that yield an action per tick."""
 
 from __future__ import annotations
 
@@ -9,14 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...planner import Arm, Body, Command, NextMotion, Plan, Pose, PosePath, ReactiveSettings, Shape, final_path
 from ...planner.errors import PlanFailed
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Shape
-from ...planner.imitation.tsia import final_path
-from ...planner.planning.plan import NextMotion, Plan
-from ...planner.reactive.command import DONE, ESCAPING, FAILED, Command, ReactiveSettings
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner.reactive.command import DONE, ESCAPING, FAILED
 from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
 from ..policy import LabeledPath, Observation
 from .goal_choice import ChosenMotion, MotionChoice, choose, departure_path
@@ -24,18 +19,18 @@ from .world_model import WorldModel
 
 OPEN, CLOSE = -1.0, 1.0
 LOST = 0.03
-"""Distance [m] of an object from where it was grasped in the hand beyond which it was dropped."""
+"""Displacement [m] of an object in the hand since the grasp beyond which the object counts as dropped."""
 SLIP, TURN = 0.002, 0.02
-"""Distance [m] and angle [rad] by which what is in the hand must slip before it is guarded where it is now."""
+"""Displacement [m] and angle [rad] an object must slip in the hand before its guarded pose is updated."""
 OFF = 0.03
-"""Height [m] over its support from which on what was lifted may be led round something."""
+"""Height [m] above its support from which a lifted object may take a detour."""
 GLANCE = 5
-"""Ticks between looks at what is in the hand."""
+"""Ticks between checks of the held object."""
 Actions = Iterator[np.ndarray]
 
 
 class _Held(NamedTuple):
-    """What is in the hand: index and shape, `tcp_from_object` when it was grasped, and as it is guarded."""
+    """The held object: index, shape, `tcp_from_object` at the grasp, and `tcp_from_object` as guarded."""
 
     index: int
     shape: Shape
@@ -44,17 +39,26 @@ class _Held(NamedTuple):
 
 
 class ArmExecutor:
-    """Commanded joints and gripper of one arm, what is around it, and the latest observation.
+    """Commanded joints and gripper of one arm, its surroundings, and the latest observation.
 
-    The loop is closed on the joints that were commanded, not on those measured: the servos lag by 40 ms, and
-    feedback of the lag oscillates at the gains wanted here.
+    The loop is closed on the commanded joints, not the measured ones: the servos lag by 40 ms, and feedback of the lag
+    oscillates at the gains wanted here.
+
+    Args:
+        arm: the arm.
+        body: its capsules with an empty hand.
+        settings: see `ReactiveSettings`.
+        world_model: obstacles around the arm.
+        observation: the first one.
+        index: of the arm in the observation.
+        motion_method: method of executing motions.
 
     Attributes:
-        q: (dof,) commanded joints.
-        empty: the body with nothing in the hand.
-        observation: the latest; the policy renews it before each tick.
-        drawn: for drawing, each finished way round something that was not shown, as commanded; and the final paths that
-            plans would have followed without it.
+        q: (dof,) commanded joints [rad].
+        empty: the body with an empty hand.
+        observation: the latest; updated by the policy before each tick.
+        drawn: paths for display: each finished detour that was not demonstrated, as commanded, and the final paths that
+            plans would have followed without the detour.
     """
 
     def __init__(
@@ -83,33 +87,39 @@ class ArmExecutor:
         return Pose.from_vector(self.observation["tcp_pose"][self.index])
 
     def object_pose(self, index: int) -> Pose:
-        """Pose of an object as observed."""
+        """Return the observed pose of an object."""
         return Pose.from_vector(self.observation["object_pose"][index])
 
     def goal_pose(self, index: int) -> Pose:
-        """Where an object must end."""
+        """Return the goal pose of an object."""
         return Pose.from_vector(self.observation["goal_pose"][index])
 
     def slow_down(self, pace: float) -> None:
-        """From now on use a share of the joints' speed limits; the hand must be on no path."""
+        """Limit the joints to a fraction of their speed limits from now on; only between motions."""
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
         self._planner = self.motion_method.follower(self.arm, self._planner.body, self._planner.settings)
 
     def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
-        """From now on object `index` is part of the arm, and no longer around it."""
+        """Treat an object as part of the arm from now on, no longer as an obstacle.
+
+        Args:
+            index: of the object.
+            shape: of the object.
+            tcp_from_object: its pose in the hand.
+        """
         self._held = _Held(index, shape, tcp_from_object, tcp_from_object)
         self.world_model.exclude(index)
         self._planner.hold(self.body_with(shape, tcp_from_object))
 
     def tcp_from(self, index: int) -> Pose:
-        """Pose of an object in the hand as observed."""
+        """Return the observed pose of an object in the hand."""
         return self.measured_tcp.inverse() @ self.object_pose(index)
 
     def lifted(self) -> Pose:
-        """`tcp_from_object` as observed of what was grasped and lifted.
+        """Return the observed `tcp_from_object` of the object that was grasped and lifted.
 
         Raises:
-            PlanFailed: "dropped", it was left behind.
+            PlanFailed: "dropped", the object was left behind.
         """
         assert self._held is not None
         now = self.tcp_from(self._held.index)
@@ -118,29 +128,42 @@ class ArmExecutor:
         return now
 
     def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
-        """The body with an object in the hand, as "held"."""
+        """Return the body with an object in the hand, named "held".
+
+        Args:
+            shape: of the object.
+            tcp_from_object: its pose in the hand.
+        """
         return self.empty.holding("held", shape, tcp_from_object, self.arm)
 
     def release(self) -> None:
-        """From now on the hand is empty."""
+        """Treat the hand as empty from now on."""
         self._held = None
         self.world_model.exclude(None)
         self._planner.hold(self.empty)
 
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
-        """The contacts that are wanted from now on: of "fingers" or "held" with a named thing."""
+        """Set the allowed contacts from now on: of "fingers" or "held" with a named object."""
         self.world_model.allow(contacts)
 
-    def choose(self, leg: MotionChoice, then: Callable[[int], MotionChoice] | None = None) -> ChosenMotion:
-        """The best goal of a leg from here; see `choice.choose`."""
-        return choose(self.arm, self._planner.settings.plan, self.q, leg, then, self.motion_method)
+    def choose(self, motion: MotionChoice, then: Callable[[int], MotionChoice] | None = None) -> ChosenMotion:
+        """Return the best goal of a motion from here; see `goal_choice.choose`.
 
-    def departure_path(self, leg: MotionChoice) -> PosePath | None:
-        """How a leg leaves from here; see `choice.departure_path`."""
-        return departure_path(self.arm, self._planner.settings.plan, self.q, leg)
+        Args:
+            motion: the motion.
+            then: returns the next motion by the index of the goal; None if there is none.
+
+        Raises:
+            PlanFailed: "blocked" or "ik_or_limit", no goal can be reached.
+        """
+        return choose(self.arm, self._planner.settings.plan, self.q, motion, then, self.motion_method)
+
+    def departure_path(self, motion: MotionChoice) -> PosePath | None:
+        """Return the departure of a motion from here; see `goal_choice.departure_path`."""
+        return departure_path(self.arm, self._planner.settings.plan, self.q, motion)
 
     def go(self, choice: ChosenMotion) -> Actions:
-        """Do what was chosen."""
+        """Execute the chosen motion."""
         *before, (last, exact) = choice.parts
         for path, to_its_end in before:
             yield from self.follow(path, exact=to_its_end)
@@ -155,18 +178,18 @@ class ArmExecutor:
         detours: bool = True,
         plan: Plan | None = None,
     ) -> Actions:
-        """Follow a path to its end, round what is in the way.
+        """Follow a path to its end, around obstacles.
 
         Args:
             path: of the tcp.
-            exact: False: done as soon as the tool is within reach of the end.
-            next_motion: what comes next: where there is a choice, the path ends in a posture that suits it.
+            exact: False: finish as soon as the tool is within reach of the end.
+            next_motion: the next motion: where there is a choice, the path ends in a posture that suits it.
             detours: False: along the path or not at all.
-            plan: what the path comes from; a hand that moves as it has planned follows that.
+            plan: the plan the path comes from; followed as planned, without replanning, if its kind is PATH.
 
         Raises:
-            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", what was in the
-                hand is not.
+            PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", the held object
+                was lost.
         """
         if plan is not None and plan.how == PATH:
             self._planner.follow(plan, exact=exact)
@@ -188,9 +211,13 @@ class ArmExecutor:
             yield self._action(command.velocity)
 
     def leave(self, path: PosePath, distance: float) -> Actions:
-        """Follow a path to within reach of its end, without detours up to `distance` [m] from its beginning.
+        """Follow a path to within reach of its end, without detours near its beginning.
 
-        A detour there would push things over.
+        A detour there would push objects over.
+
+        Args:
+            path: of the tcp.
+            distance: from the beginning [m] up to which there are no detours.
 
         Raises:
             PlanFailed: as `follow`.
@@ -209,7 +236,7 @@ class ArmExecutor:
             self._escape = []
 
     def _mind_held(self) -> None:
-        """Guard what is in the hand where it has slipped to."""
+        """Update the guarded pose of a held object that has slipped."""
         if self._held is None:
             return
         held, now = self._held, self.tcp_from(self._held.index)
@@ -221,18 +248,23 @@ class ArmExecutor:
             self._planner.hold(self.body_with(held.shape, now))
 
     def wait(self, seconds: float) -> Actions:
-        """Stand still with the gripper as it is."""
+        """Stand still with the gripper unchanged."""
         self._planner.stop()
         for _ in range(round(seconds / self.settings.dt)):
             yield self.still()
 
     def grip(self, direction: float, seconds: float) -> Actions:
-        """Open or close the gripper and keep doing so."""
+        """Open or close the gripper and keep the command.
+
+        Args:
+            direction: `OPEN` or `CLOSE`.
+            seconds: time [s] to wait meanwhile.
+        """
         self._gripper = direction
         return self.wait(seconds)
 
     def still(self) -> np.ndarray:
-        """The action of standing still, or of retreating from what comes too close."""
+        """Return the action of standing still, or of retreating from approaching obstacles."""
         self._planner.stop()
         return self._action(self._planned().velocity)
 

@@ -1,8 +1,8 @@
-"""Pouring with two hands from the demonstration of one: the relative motion of the glasses is what was shown.
+"""Pouring with two hands from the demonstration of one: the relative motion of the glasses is imitated.
 
-Lip and rim are the frames of imitation, so that glasses of other sizes need no other demonstration. Where the pouring
-happens in the world, in which direction, and how the round glasses are turned in the hands says nothing to the task:
-of these the first choice is taken with which both arms arrive, clear of each other and of the trunk.
+Lip and rim are the frames of imitation, so that glasses of other sizes need no other demonstration. The place and
+direction of pouring in the world and the yaw of the round glasses in the hands are irrelevant to the task: the first
+choice is taken with which both arms arrive, clear of each other and of the trunk.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
+from ...envs import TaskDescription
 from ...envs.pour.geometry import SOURCE, TARGET
+from ...planner import Demonstration, Pose, PosePath
 from ...planner.errors import PlanFailed
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import Pose, PosePath
 from ...planner.imitation.bimanual import shared_translation
-from ...planner.imitation.demonstration import Demonstration
 from ...planner.imitation.segmentation import resampled
+from ...planner.robot.kinematics import CHAIN
 from ..policy import LabeledPath
 from .dual_arm_executor import DualArmExecutor, DualArmRollOut, Paths
 from .pour_goals import Size, lip, lip_direction, standing
@@ -29,27 +29,27 @@ if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings
 
 POUR_YAWS = np.deg2rad((120.0, 105.0, 135.0, 90.0))
-"""Directions of pouring [rad] in the world that are tried: to the left and away from the robot."""
+"""Directions of pouring [rad] in the world to try: to the left and away from the robot."""
 SIDES = np.deg2rad((-60.0, -75.0, -90.0, -45.0))
-"""Directions of the pouring hand against that of pouring [rad]: the hand comes from the side, and tilts by a roll."""
+"""Yaw [rad] of the pouring hand relative to the pouring direction: the hand comes from the side and tilts by roll."""
 HOLDER_YAWS = np.deg2rad((-60.0, -30.0, -90.0))
 """Directions of the hand with the target [rad] in the world."""
 PLACES = ((0.80, 0.0, 0.25), (0.74, 0.0, 0.15), (0.69, 0.0, 0.10))
-"""Of the target's rim at the end [m], from the middle between the two shoulders."""
+"""Positions of the target's rim at the end [m], relative to the middle between the two shoulders."""
 SHARE = 0.5
-"""The left hand's part of the translation; it never turns, so that the target stays upright."""
+"""The left hand's fraction of the translation; it never rotates, so that the target stays upright."""
 FURTHER, LOWER = 0.004, 0.008
-"""How much further over the target and lower than shown the lip ends [m]: this target is narrower."""
+"""Displacement of the lip's end [m], further over the target and lower than demonstrated: this target is narrower."""
 MARGIN = 0.08
-"""Distance of the joints to their limits [rad] in a roll-out with which a choice is good enough to look no further."""
+"""Distance of the joints to their limits [rad] in a roll-out from which a choice ends the search."""
 SLOW = 0.008
-"""Screw length [m] within which both hands follow: it is what limits their speed."""
+"""Path length [m] within which both hands follow, which limits their speed."""
 LEAST = 60
-"""Choices that are rolled out before giving up."""
+"""Largest number of choices rolled out."""
 
 
 class PourSwing(NamedTuple):
-    """A way to do it.
+    """Paths of pouring.
 
     Attributes:
         forth: paths of the right and the left tcp, from the start to the end of pouring.
@@ -61,10 +61,17 @@ class PourSwing(NamedTuple):
 
 
 class BimanualPourProgram:
-    """The program of one episode; iterate over `actions()`."""
+    """The program of one episode; iterate over `actions()`.
+
+    Args:
+        task: the task.
+        shown: the demonstration.
+        settings: see `ProgramSettings`.
+        hands: executor of both arms.
+    """
 
     SEGMENTS = ("approach", "carry", "return")
-    """What a demonstration of this task must have."""
+    """Segments required of a demonstration of this task."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: DualArmExecutor):
         self.task, self.settings, self.hands = task, settings, hands
@@ -73,7 +80,7 @@ class BimanualPourProgram:
         self.paths = [LabeledPath("demonstrated", "carry", shown.segment_path("carry"))]
 
     def _read(self, shown: Demonstration) -> None:
-        """The relative paths rim_from_lip of the demonstration."""
+        """Read the relative paths rim_from_lip of the demonstration."""
         sizes = [Size.of(shown.object_sizes[each.name]) for each in self.task.objects]
         source = standing(shown.segment("approach").reference_pose)
         held = shown.segment_path("approach")[-1].inverse() @ source
@@ -102,7 +109,7 @@ class BimanualPourProgram:
         yield from hands.move(choice.back, SLOW)
 
     def _chosen(self, held: list[Pose]) -> PourSwing:
-        """The first choice whose roll-out arrives with room to the joint limits, else the best that arrives."""
+        """Return the first choice whose roll-out arrives clear of the joint limits, else the best that arrives."""
         best: tuple[float, PourSwing] | None = None
         failed = DualArmRollOut("ik_or_limit", self.hands.q, 0.0)
         choices = product(PLACES, POUR_YAWS, HOLDER_YAWS, SIDES)
@@ -120,20 +127,20 @@ class BimanualPourProgram:
         return best[1]
 
     def _choice(self, held: list[Pose], place: np.ndarray, pour: float, pourer: float, holder: float) -> PourSwing:
-        """The paths of both tcps.
+        """Return the paths of both tcps.
 
         Args:
             held: `tcp_from_object` of source and target.
-            place: (3,) of the target's rim at the end, from the middle between the shoulders [m].
+            place: (3,) of the target's rim at the end, relative to the middle between the shoulders [m].
             pour: direction of pouring in the world [rad].
             pourer: direction of the right hand while the source is upright [rad].
             holder: direction of the left hand [rad].
         """
-        shoulders = np.mean([arm.chain[0, 4:7] for arm in self.task.arms], axis=0)
+        shoulders = np.mean([arm.chain[0, CHAIN.offset : CHAIN.kind] for arm in self.task.arms], axis=0)
         shown_yaw = float(np.arctan2(self._direction[1], self._direction[0]))
         turn = pour - shown_yaw
         world_from_rim = Pose.from_yaw(shoulders + place, turn)
-        # the round glasses, turned in the hands so that the hands point where they should
+        # the round glasses, turned in the hands so that the hands point in their directions
         tool = _turned(held[SOURCE], turn, pourer) @ lip(self._sizes[SOURCE], self._direction)
         hold = _turned(held[TARGET], turn, holder) @ _top(self._sizes[TARGET])
         right, left = (arm.fk(q) for arm, q in zip(self.task.arms, self.hands.q, strict=True))
@@ -163,10 +170,10 @@ def _turned(held: Pose, glass: float, hand: float) -> Pose:
 
 
 def _in_equal_steps(start: Pose, end: Pose, count: int) -> PosePath:
-    """`count` poses along the screw from a start, its end left out."""
+    """Return `count` poses along the screw between two poses, without its end."""
     return PosePath(dq.sclerp(start.dq, end.dq, np.arange(count) / max(count, 1)))
 
 
 def _composed(first: PosePath, second: PosePath) -> PosePath:
-    """Products pose by pose."""
+    """Return the products pose by pose."""
     return PosePath(dq.mul(first.dqs, second.dqs))

@@ -1,7 +1,7 @@
-"""Two arms that hold something from the start and move together: generators that yield an action per tick.
+"""Two arms that hold objects from the start and move together: generators that yield an action per tick.
 
-Both follow their paths at the same index, so that what one hand does to the other is as planned; the safety layer of
-both arms has the last word. There are no detours: what is in the way stops them.
+Both follow their paths at the same index, so that the relative motion of the hands is as planned; the safety layer of
+both arms filters every command. There are no detours: obstacles stop the arms.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
-from ...planner.collision.robot_arrays import PREVIOUS
+from ...envs import TaskDescription
+from ...planner import Controller, Pose, PosePath, SafetyLayer
+from ...planner.collision.robot_arrays import ROW
 from ...planner.collision.self_collision import pairs_of
-from ...planner.control.controller import Controller
 from ...planner.errors import PlanFailed
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
-from ...planner.safety.safety_layer import BLOCKED, SafetyLayer
+from ...planner.geometry.pose import METERS_PER_RADIAN
+from ...planner.safety.safety_layer import BLOCKED
 from ..motion.motion_method import MotionMethod
 from ..motion.settings import ProgramSettings
 from ..policy import LabeledPath, Observation
@@ -27,18 +27,18 @@ from .world_model import TABLE, TABLE_MARGIN, obstacles_in
 
 CLOSE = 1.0
 WRIST = 3
-"""Joints between capsules of one arm that are kept apart: across a wrist, whose axes meet, they are always close."""
+"""Within one arm, only capsules at least this many joints apart are checked: across a wrist they are always close."""
 NEAR = 0.02
-"""Distance [rad] of every joint to the next of a way through joint space at which it counts as reached."""
+"""Distance [rad] of every joint to the next point of a joint-space path at which that point counts as reached."""
 Paths = tuple[PosePath, PosePath]
 
 
 class DualArmRollOut(NamedTuple):
-    """What became of a kinematic run along two paths.
+    """Result of a kinematic run along two paths.
 
     Attributes:
         reason: "" if both arrived, else "blocked" or "ik_or_limit".
-        q: (2, dof) joints at its end.
+        q: (2, dof) joints at its end [rad].
         margin: smallest distance to a joint limit on the way [rad].
     """
 
@@ -48,12 +48,18 @@ class DualArmRollOut(NamedTuple):
 
 
 class DualArmExecutor:
-    """Commanded joints of two arms with what they hold, and the latest observation.
+    """Commanded joints of two arms with their held objects, and the latest observation.
+
+    Args:
+        task: the task, with the arms and their bodies.
+        settings: see `ProgramSettings`.
+        observation: the first one.
+        motion_method: method of executing motions.
 
     Attributes:
-        q: (2, dof) commanded joints.
-        observation: the latest; the policy renews it before each tick.
-        drawn: none, see `ArmExecutor`.
+        q: (2, dof) commanded joints [rad].
+        observation: the latest; updated by the policy before each tick.
+        drawn: always empty, see `ArmExecutor`.
     """
 
     drawn: tuple[LabeledPath, ...] = ()
@@ -76,12 +82,17 @@ class DualArmExecutor:
         self._layer = self._renewed_layer()
 
     def held(self, arm: int, index: int) -> Pose:
-        """`tcp_from_object` as observed."""
+        """Return the observed `tcp_from_object`.
+
+        Args:
+            arm: index of the arm.
+            index: of the object.
+        """
         tcp = Pose.from_vector(self.observation["tcp_pose"][arm])
         return tcp.inverse() @ Pose.from_vector(self.observation["object_pose"][index])
 
     def hold(self, held: Sequence[Pose]) -> None:
-        """From now on hand k holds object k, as `tcp_from_object`; the two objects may come near each other."""
+        """Set `tcp_from_object` of object k in hand k from now on; the two objects may come near each other."""
         objects = self.task.objects
         self._bodies = tuple(
             body.holding(each.name, each.shape, pose, arm)
@@ -94,7 +105,15 @@ class DualArmExecutor:
         self._layer = self._renewed_layer()
 
     def move(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
-        """Bring both hands along paths, or to their ends by another way if the mover has one; see `follow`."""
+        """Move both hands along paths, or to their ends by the motion method's own joint-space path.
+
+        Args:
+            paths: of the two tcps, equally many poses.
+            radius: see `follow` [m].
+
+        Raises:
+            PlanFailed: as `follow`; also if no joint-space path is found.
+        """
         ends = [path[-1] for path in paths]
         path = self.motion_method.dual_arm_path(self.arms, self.q, ends, self._seen, self.settings.dt)
         if path is None:
@@ -105,7 +124,7 @@ class DualArmExecutor:
         return self._follow_joints(path)
 
     def _follow_joints(self, path: np.ndarray) -> Iterator[np.ndarray]:
-        """Along joints (t, 2, dof), as far as the safety layer lets them."""
+        """Follow joints (t, 2, dof) as far as the safety layer permits."""
         index, waited = 0, 0.0
         while index < len(path):
             wanted = (path[index] - self.q).ravel() / self.settings.dt
@@ -117,7 +136,11 @@ class DualArmExecutor:
                 raise PlanFailed("blocked", f"no progress at {index / len(path):.0%} of the way of both hands")
 
     def follow(self, paths: Paths, radius: float) -> Iterator[np.ndarray]:
-        """Follow two paths of the same length; each pose is left when both are within a screw length of it [m].
+        """Follow two paths pose by pose.
+
+        Args:
+            paths: of the two tcps, equally many poses.
+            radius: path length [m] to its pose within which each hand must be before the next pair of poses.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience.
@@ -141,27 +164,32 @@ class DualArmExecutor:
             yield self.still()
 
     def still(self) -> np.ndarray:
-        """The action of standing still, or of retreating from what comes too close."""
+        """Return the action of standing still, or of retreating from approaching obstacles."""
         if len(obstacles_in(self.observation)):
             self._layer = self._renewed_layer()
         return self._action(self._layer(self.q.ravel(), np.zeros(self.q.size)).velocity.reshape(self.q.shape))
 
     def roll_out(self, paths: Paths, radius: float) -> DualArmRollOut:
-        """What would become of following two paths from now on, by kinematics alone; nothing is moved."""
-        start, previous = self.q.copy(), self._layer.work[PREVIOUS].copy()
+        """Predict the result of following two paths from now on, by kinematics alone; nothing is moved.
+
+        Args:
+            paths: of the two tcps, equally many poses.
+            radius: see `follow` [m].
+        """
+        start, previous = self.q.copy(), self._layer.work[ROW.previous].copy()
         margin, reason = np.inf, ""
         try:
             for _ in self.move(paths, radius):
                 margin = min(margin, *(arm.margin(q) for arm, q in zip(self.arms, self.q, strict=True)))
         except PlanFailed as failure:
             reason = failure.reason
-        end, self.q, self._layer.work[PREVIOUS] = self.q, start, previous
+        end, self.q, self._layer.work[ROW.previous] = self.q, start, previous
         for controller in self._controllers:
             controller.reset()
         return DualArmRollOut(reason, end, margin)
 
     def _towards(self, paths: Paths, index: int) -> tuple[np.ndarray, bool]:
-        """Safe speeds (2, dof) towards a pose of each path, and whether something is in the way."""
+        """Return safe speeds (2, dof) towards a pose of each path, and whether an obstacle blocks them."""
         each = zip(self._controllers, self.q, paths, strict=True)
         wanted = np.array([controller(q, path[index]) for controller, q, path in each])
         filtered = self._layer(self.q.ravel(), wanted.ravel())
@@ -169,7 +197,7 @@ class DualArmExecutor:
         return filtered.velocity.reshape(self.q.shape), filtered.status == BLOCKED or near
 
     def _gap(self, paths: Paths, index: int) -> float:
-        """The larger screw length [m] of the two hands to a pose of their paths."""
+        """Return the larger path length [m] of the two hands to a pose of their paths."""
         gaps = [
             dq.pose_distance(arm.fk(q).dq, path.dqs[index])
             for arm, q, path in zip(self.arms, self.q, paths, strict=True)
@@ -183,7 +211,7 @@ class DualArmExecutor:
         return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
 
     def _seen(self) -> np.ndarray:
-        """Both arms among all that is around, guard or not."""
+        """Return both arms among all obstacles, with or without guard."""
         return self._renewed_layer(guard=True).work
 
     def _renewed_layer(self, *, guard: bool = False) -> SafetyLayer:

@@ -1,8 +1,8 @@
-"""Pouring from ONE demonstration: fetch the source, lift it, carry and tilt it as shown, seen from the target.
+"""Pouring from ONE demonstration: fetch the source, lift it, carry and tilt it as demonstrated relative to the target.
 
-Only the goals are new, see `pour_goals`. Of the turns of a round glass the one next to the demonstrated is taken that
-can be done beside everything around. The lift is a motion relative to where the source stands, which imitation
-anchored at the target would forget.
+Only the goals are new, see `pour_goals`. Among the yaws of a round glass, the feasible one nearest to the
+demonstrated yaw is taken. The lift is a motion relative to the initial pose of the source, which imitation anchored at
+the target would lose.
 """
 
 from __future__ import annotations
@@ -13,17 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
+from ...envs import TaskDescription
 from ...envs.pour.geometry import SOURCE, TARGET
 from ...envs.scene.body_clearance import tool_clearance
+from ...planner import Body, Demonstration, Obstacle, Plan, Pose, PosePath, imitated_path
 from ...planner.errors import PlanFailed
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle, pack
-from ...planner.imitation.demonstration import Demonstration
+from ...planner.geometry.shapes import pack
 from ...planner.imitation.segmentation import resampled
-from ...planner.imitation.tsia import departure, imitated_path, screw_path
-from ...planner.planning.plan import Plan
-from ...planner.robot.body import Body
+from ...planner.imitation.tsia import departure, screw_path
 from ..motion.motion_method import DIRECT, MADE, MotionPlanner
 from ..policy import LabeledPath
 from .arm_executor import CLOSE, OFF, ArmExecutor
@@ -33,32 +30,32 @@ if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings
 
 TURNS = np.deg2rad([0.0, *(sign * turn for turn in range(15, 91, 15) for sign in (1, -1))])
-"""Turns about a glass's axis [rad] that are tried, the demonstrated direction first."""
+"""Rotations about a glass's axis [rad] to try, the demonstrated direction first."""
 MARGIN = 0.08
-"""Distance of the joints to their limits [rad] in a roll-out with which a goal is good enough to look no further."""
+"""Distance of the joints to their limits [rad] in a roll-out from which a goal ends the search."""
 PACE = 0.5
-"""Share of the joints' speed limits that is used: a glass that is moved faster slips and lags behind what guards it."""
+"""Fraction of the joints' speed limits in use: a glass moved faster slips and lags behind its guarded pose."""
 NEAR = 0.02
-"""Distance [m] to the target from which on the source comes close to it on purpose."""
+"""Distance [m] to the target below which the source approaches the target intentionally."""
 LIFT = 0.08
-"""Height [m] of a lift straight up, where none is shown."""
+"""Height [m] of a lift straight up, if none was demonstrated."""
 CHANCES = 3
-"""How often another way is looked for where the carry is blocked."""
+"""Number of attempts where the carry is blocked."""
 
 
 Contacts = tuple[tuple[str, str], ...]
 
 
 class CarryCandidate(NamedTuple):
-    """Motions as planned, one after the other.
+    """Consecutive motions as planned.
 
     Attributes:
         paths: to follow.
-        plans: what each comes from.
-        q: (dof,) joints at the end.
+        plans: the plan of each path.
+        q: (dof,) joints at the end [rad].
         margin: smallest joint margin on the way [rad].
-        rank: 2 as shown, 1 round something or through joint space, 0 does not arrive.
-        reason: "" or why it does not arrive.
+        rank: 2 as demonstrated, 1 with a detour or through joint space, 0 does not arrive.
+        reason: "" or the reason of failure.
     """
 
     paths: tuple[PosePath, ...]
@@ -69,22 +66,29 @@ class CarryCandidate(NamedTuple):
     reason: str = ""
 
     def then(self, other: CarryCandidate) -> CarryCandidate:
-        """Both, one after the other."""
+        """Return this candidate followed by another."""
         margin, rank = min(self.margin, other.margin), min(self.rank, other.rank)
         paths, plans = (*self.paths, *other.paths), (*self.plans, *other.plans)
         return CarryCandidate(paths, plans, other.q, margin, rank, self.reason or other.reason)
 
     @property
     def order(self) -> tuple[int, bool, float]:
-        """What is better."""
+        """Sort key, larger is better."""
         return self.rank, self.margin >= MARGIN, self.margin
 
 
 class PourProgram:
-    """The program of one episode; iterate over `actions()`."""
+    """The program of one episode; iterate over `actions()`.
+
+    Args:
+        task: the task.
+        shown: the demonstration.
+        settings: see `ProgramSettings`.
+        executor: of the arm.
+    """
 
     SEGMENTS = ("carry",)
-    """What a demonstration must have; "approach" too where the source is not in the hand from the start."""
+    """Segments required of a demonstration; "approach" too if the source is not in the hand from the start."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.settings, self.executor = task, settings, executor
@@ -113,7 +117,7 @@ class PourProgram:
         if self._stands():
             executor.allow(self._standing)
             yield from executor.leave(self._lift(executor.arm.fk(executor.q)), OFF)
-        # the source slips a little while it is lifted: the goal is computed from how it is held now
+        # the source slips a little during the lift: the goal is computed from its present pose in the hand
         held = executor.lifted()
         executor.hold(SOURCE, shape, held)
         yield from self._carry(held)
@@ -121,7 +125,7 @@ class PourProgram:
         yield from self._return()
 
     def _stands(self) -> bool:
-        """Whether the source is on its stand, from which it must be lifted."""
+        """Return True if the source is on its stand, from which it must be lifted."""
         bottom = self.executor.object_pose(SOURCE).position - [0.0, 0.0, 0.5 * self.task.objects[SOURCE].size[2]]
         return float(np.linalg.norm(bottom - self.executor.observation["furniture_pose"][SOURCE, :3])) < OFF
 
@@ -136,14 +140,14 @@ class PourProgram:
         yield from self.executor.grip(CLOSE, self.settings.close)
 
     def _lift(self, start: Pose) -> PosePath:
-        """As shown, from where the hand is; straight up if it is not shown."""
+        """Return the demonstrated lift from the present pose of the hand; straight up if none was demonstrated."""
         if "lift" in self.shown:
             return departure(self.shown["lift"], start, np.inf)
         up = Pose.from_position_quaternion([0.0, 0.0, LIFT]) @ start
         return screw_path(start, up, self.settings.resample)
 
     def _carry(self, held: Pose) -> Iterator[np.ndarray]:
-        """Carry, then tilt; another way is looked for where one turns out to be blocked."""
+        """Carry, then tilt; another path is searched where one proves blocked."""
         failed: list[float] = []
         while True:
             candidate, turn = self._chosen_carry(self.executor.q, held, failed, thoroughly=True)
@@ -152,7 +156,7 @@ class PourProgram:
             self.executor.allow(())
             try:
                 yield from self.executor.follow(carry, exact=False, plan=candidate.plans[0])
-                # near the target, the source may come as near to it as was shown
+                # near the target, the source may come as close to the target as demonstrated
                 self.executor.allow(self._wanted[TARGET])
                 yield from self.executor.follow(tilt, plan=candidate.plans[1])
                 return
@@ -162,7 +166,7 @@ class PourProgram:
                     raise
 
     def _return(self) -> Iterator[np.ndarray]:
-        """Upright again, as shown if it is shown."""
+        """Return the source to upright, as demonstrated, if demonstrated."""
         if "return" in self.shown:
             back = self.shown["return"]
             here = self.executor.arm.fk(self.executor.q)
@@ -172,13 +176,13 @@ class PourProgram:
         return self.task.bodies[0].holding("held", self.task.objects[SOURCE].shape, held, self.executor.arm)
 
     def _named_obstacles(self, body: Body) -> list[Obstacle]:
-        """What stands around an arm; what moves is left to the moment."""
+        """Return the obstacles around an arm, without the moving ones."""
         seen = self.executor.world_model.obstacles(self.executor.observation)
         still = [each for each in seen if not np.any(each.velocity)]
         return [each for each in still if not (body.held and each.name == self.source)]
 
     def _near(self, index: int, path: PosePath, body: Body) -> int:
-        """Index of the pose from which on the hand, or what it holds, stays near a glass."""
+        """Return the index of the pose from which the hand, or the held object, stays near a glass."""
         glass = pack([Obstacle(self.task.objects[index].shape, self.executor.object_pose(index))])
         tool = body.tool(self.executor.arm)
         rooms = np.array([tool_clearance(tool, row[None], glass) for row in path.dqs])
@@ -186,7 +190,7 @@ class PourProgram:
         return max(1, int(far[-1])) if len(far) else 1
 
     def _planned(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> CarryCandidate:
-        """A motion to the end of a path, round what is around."""
+        """Plan a motion to the end of a path, around obstacles."""
         contacts = (*self.task.touching, *allowed)
         plan = planner.plan(path, q, path[-1], self._named_obstacles(planner.body), allowed=contacts)
         followed = path if plan.how == "joint search" or not plan.success else plan.path
@@ -198,7 +202,7 @@ class PourProgram:
         )
 
     def _chosen_fetch(self) -> CarryCandidate:
-        """The grasp, and with it the pouring, that is nearest to what was shown and can be done."""
+        """Return the feasible grasp, with its pouring, that is nearest to the demonstration."""
         executor, best, held = self.executor, None, self.goals.held
         empty = executor.motion_method.planner(executor.arm, self.task.bodies[0], self._plan)
         full = executor.motion_method.planner(executor.arm, self._body(held), replace(self._plan, search=None))
@@ -221,13 +225,13 @@ class PourProgram:
     def _chosen_carry(
         self, q: np.ndarray, held: Pose, failed: list[float], *, thoroughly: bool
     ) -> tuple[CarryCandidate, float]:
-        """The pouring direction that is nearest to what was shown and can be done from joints q, and its turn.
+        """Return the feasible direction of pouring nearest to the demonstration from joints q, and its rotation.
 
         Args:
-            q: (dof,) joints at the start.
+            q: (dof,) joints at the start [rad].
             held: `tcp_from_source`.
-            failed: turns that were tried in vain.
-            thoroughly: also look for ways through joint space.
+            failed: rotations tried without success [rad].
+            thoroughly: True: also search in joint space.
         """
         body = self._body(held)
         quick = self.executor.motion_method.planner(self.executor.arm, body, replace(self._plan, search=None))
@@ -245,12 +249,12 @@ class PourProgram:
         return best
 
     def _carried(self, planner: MotionPlanner, q: np.ndarray, held: Pose, turn: float) -> CarryCandidate:
-        """The carry and the tilting of one turn."""
+        """Plan the carry and the tilt of one rotation."""
         goal = self.goals.pouring(self.executor.object_pose(TARGET), held, turn)
         return self._in_two(planner, imitated_path(self.shown["carry"], goal), q, TARGET)
 
     def _in_two(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, glass: int) -> CarryCandidate:
-        """A path that ends near a glass, which may be touched only by what comes near it on purpose."""
+        """Plan a path that ends near a glass in two parts; only the second may touch the glass."""
         split = self._near(glass, path, planner.body)
         before, after = path[: split + 1], path[split:]
         candidate = self._planned(planner, before, q, ())

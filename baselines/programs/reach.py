@@ -1,4 +1,4 @@
-"""Reaching as shown: the demonstrated approach, seen from where the hand must end."""
+"""Reaching as demonstrated: the demonstrated approach, relative to the goal of the hand."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
-from ...planner.geometry.pose import Pose
-from ...planner.imitation.demonstration import Demonstration
+from ...envs import TaskDescription
+from ...planner import Demonstration, Pose
 from ...planner.imitation.segmentation import resampled
 from ..policy import LabeledPath
 from .arm_executor import ArmExecutor
@@ -20,10 +19,17 @@ if TYPE_CHECKING:
 
 
 class ReachProgram:
-    """The program of one episode; iterate over `actions()`."""
+    """The program of one episode; iterate over `actions()`.
+
+    Args:
+        task: the task.
+        shown: the demonstration.
+        settings: see `ProgramSettings`.
+        executor: of the arm.
+    """
 
     SEGMENTS = ("approach",)
-    """What a demonstration of this task must have."""
+    """Segments required of a demonstration of this task."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.settings, self.executor = task, settings, executor
@@ -31,7 +37,7 @@ class ReachProgram:
         self.paths = [LabeledPath("demonstrated", "approach", self.approach)]
 
     def actions(self) -> Iterator[np.ndarray]:
-        """Go there; half a turn of the hand makes no difference."""
+        """Yield the actions of moving to the goal; a half turn of the hand makes no difference."""
         executor, target = self.executor, self.task.objects[0].name
         goals = tuple(executor.goal_pose(0) @ Pose.from_yaw([0.0, 0.0, 0.0], turn) for turn in (0.0, np.pi))
         around = executor.world_model.obstacles_if_holding(executor.observation, None)

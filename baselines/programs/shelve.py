@@ -1,8 +1,8 @@
-"""Shelving from the demonstration of ONE book in the lower shelf: fetch, lift, carry, insert, again and again.
+"""Shelving from the demonstration of ONE book in the lower shelf: fetch, lift, carry, insert, repeatedly.
 
-Only the goals are new: a grasp is where the demonstrated hand was relative to the book it took, the end of an
-insertion is the slot, seen from how the hand holds the book, and the end of a carry is where that insertion begins.
-Lift and retreat are imitated from where they start: both leave something that they must not drag along.
+Only the goals are new: a grasp is the demonstrated pose of the hand relative to the grasped book, the end of an
+insertion is the slot, given the book's pose in the hand, and the end of a carry is the beginning of that insertion.
+Lift and retreat are imitated from their starts: both leave objects that must not be dragged along.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
+from ...envs import TaskDescription
 from ...envs.scene.robots import robot_named
+from ...planner import Demonstration, Pose, PosePath, imitated_path
 from ...planner.errors import PlanFailed
-from ...planner.geometry.pose import Pose, PosePath, nearest
-from ...planner.imitation.demonstration import Demonstration
+from ...planner.geometry.pose import nearest
 from ...planner.imitation.segmentation import resampled
-from ...planner.imitation.tsia import imitated_path, screw_path
+from ...planner.imitation.tsia import screw_path
 from ..policy import LabeledPath
 from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor
 from .goal_choice import ChosenMotion, MotionChoice
@@ -29,20 +29,27 @@ if TYPE_CHECKING:
 
 CUPBOARD, STAND = "cupboard", "stand"
 BETWEEN = 0.07
-"""Way back [m] after which the fingers are no longer between books."""
+"""Distance [m] of the retreat after which the fingers are no longer between books."""
 PACE = 0.6
-"""Share of the joints' speed limits that is used with a book: one that is moved faster turns in the hand."""
+"""Fraction of the joints' speed limits in use with a book: a book moved faster turns in the hand."""
 CHANCES = 3
-"""How often an insertion is begun, each time from another posture."""
+"""Number of attempts of an insertion, each from another posture."""
 PATIENCE = 5.0
-"""Seconds that a book is waited for."""
+"""Time [s] to wait for a book."""
 
 
 class ShelveProgram:
-    """The program of one episode; iterate over `actions()`."""
+    """The program of one episode; iterate over `actions()`.
+
+    Args:
+        task: the task.
+        shown: the demonstration.
+        settings: see `ProgramSettings`.
+        executor: of the arm.
+    """
 
     SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")
-    """What a demonstration of this task must have."""
+    """Segments required of a demonstration of this task."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.shown, self.settings, self.executor = task, shown, settings, executor
@@ -51,7 +58,7 @@ class ShelveProgram:
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 
     def actions(self) -> Iterator[np.ndarray]:
-        """Fetch and shelve each book in order, then withdraw; a first one may be in the hand already."""
+        """Fetch and shelve each book in order, then withdraw; the first book may be in the hand already."""
         in_hand = self.executor.observation["motion_index"][0] == 1.0
         for k in range(len(self.executor.observation["goal_pose"])):
             if in_hand and k == 0:
@@ -66,7 +73,7 @@ class ShelveProgram:
             yield from self._retreat()
 
     def _awaited(self, k: int) -> Iterator[np.ndarray]:
-        """Open the hand, and rise out of the way until book k lies on the stand: nobody reaches under an arm."""
+        """Open the hand, and rise until book k lies on the stand: a book is not handed over under an arm."""
         yield from self.executor.grip(OPEN, self.settings.open)
         out_of_the_way = () if self._on_stand(k) else self.executor.follow(self._rise(), exact=False)
         for action in out_of_the_way:
@@ -81,7 +88,7 @@ class ShelveProgram:
             yield self.executor.still()
 
     def _rise(self) -> PosePath:
-        """Straight up from here by as much as the demonstrated lift: the hand is turned otherwise than there."""
+        """Return a path straight up by the height of the demonstrated lift, in the present orientation of the hand."""
         here, lift = self.executor.arm.fk(self.executor.q), self._parts["lift"]
         height = lift[-1].position[2] - lift[0].position[2]
         up = Pose.from_position_quaternion([0.0, 0.0, height])
@@ -99,9 +106,9 @@ class ShelveProgram:
         grasp = self.shown.segment("reach").reference_pose.inverse() @ reach[-1]
         goal = self.executor.object_pose(k) @ grasp
         touching = (*_named_obstacles((self.task.objects[k].name,)), ("fingers", STAND))
-        leg = self._leg("approach", k, imitated_path(reach, goal)[0])
-        choice = self.executor.choose(leg, lambda _: self._leg("reach", k, goal, touching))
-        yield from self._done(choice, leg)
+        motion = self._motion_choice("approach", k, imitated_path(reach, goal)[0])
+        choice = self.executor.choose(motion, lambda _: self._motion_choice("reach", k, goal, touching))
+        yield from self._done(choice, motion)
         self.executor.allow(touching)
         yield from self.executor.follow(imitated_path(reach, goal))
         yield from self.executor.wait(self.settings.settle)
@@ -124,12 +131,14 @@ class ShelveProgram:
         names = [each.name for each in self.task.objects]
         touching = (("held", CUPBOARD), *_named_obstacles(names[:k] + names[k + 1 :]))
         for chance in range(CHANCES):
-            # the book slips a little while it is lifted: the goal is computed from how it is held now
+            # the book slips a little during the lift: the goal is computed from its present pose in the hand
             held = self.executor.tcp_from(k)
             insertion = self._insertion(k, held)
-            into = self._leg("insert", k, insertion[-1], touching, held)._replace(demonstrated=insertion, detours=False)
-            leg, choice = self._chosen_carry(k, insertion[0], held, into)
-            yield from self._done(choice, leg)
+            into = self._motion_choice("insert", k, insertion[-1], touching, held)._replace(
+                demonstrated=insertion, detours=False
+            )
+            motion, choice = self._chosen_carry(k, insertion[0], held, into)
+            yield from self._done(choice, motion)
             self.executor.world_model.set_margin(OBJECT_MARGIN)
             self.executor.allow(touching)
             insertion = self._insertion(k, self.executor.tcp_from(k))
@@ -146,28 +155,28 @@ class ShelveProgram:
         self.executor.allow(_named_obstacles(names))
 
     def _backed_out(self, insertion: PosePath) -> Iterator[np.ndarray]:
-        """Out again, to where an insertion has begun."""
+        """Move back to the beginning of an insertion."""
         here = nearest(insertion, self.executor.arm.fk(self.executor.q))
         if here:
             yield from self.executor.follow(insertion[: here + 1].reversed(), exact=False, detours=False)
 
     def _chosen_carry(self, k: int, goal: Pose, held: Pose, into: MotionChoice) -> tuple[MotionChoice, ChosenMotion]:
-        """To before the slot, well clear of everything; with little room where there is no other way."""
+        """Choose a carry to the front of the slot: with a large margin, or with a small one if nothing else works."""
         failure = PlanFailed("ik_or_limit", f"no posture is found from which {into.name} can go straight")
         for margin in (FREE_MARGIN, OBJECT_MARGIN):
             self.executor.world_model.set_margin(margin)
-            leg = self._leg("carry", k, goal, held=held)
+            motion = self._motion_choice("carry", k, goal, held=held)
             try:
-                choice = self.executor.choose(leg, lambda _: into)
+                choice = self.executor.choose(motion, lambda _: into)
             except PlanFailed as failed:
                 failure = failed
             else:
                 if choice.then is not None:
-                    return leg, choice
+                    return motion, choice
         raise failure
 
     def _retreat(self) -> Iterator[np.ndarray]:
-        """Straight back: from between the books first, where a detour would push them over."""
+        """Move straight back: first from between the books, where a detour would push them over."""
         path = self._from_here("retreat")
         free = int(np.argmax(np.linalg.norm(path.positions - path.positions[0], axis=1) > BETWEEN))
         yield from self.executor.follow(path[: free + 1], exact=False, detours=False)
@@ -176,9 +185,9 @@ class ShelveProgram:
         yield from self.executor.follow(path[free:], exact=False)
 
     def _insertion(self, k: int, held: Pose) -> PosePath:
-        """The demonstrated insertion, to where the hand lets go so that the book is in its slot.
+        """Return the demonstrated insertion, ending where the released book is in its slot.
 
-        It stays as level as it was shown: a book that hangs a little in the hand turns the hand, not the way.
+        The path stays as level as demonstrated: a book tilted in the hand turns the hand, not the path.
         """
         above, shown = Pose.from_position_quaternion([0.0, 0.0, self.settings.release_height]), self._parts["insert"]
         end = above @ self.executor.goal_pose(k) @ held.inverse()
@@ -190,15 +199,15 @@ class ShelveProgram:
         path = self._parts[name]
         return path.moved(self.executor.arm.fk(self.executor.q) @ path[0].inverse())
 
-    def _done(self, choice: ChosenMotion, leg: MotionChoice) -> Iterator[np.ndarray]:
-        self.paths.append(LabeledPath("final", leg.name, choice.path))
+    def _done(self, choice: ChosenMotion, motion: MotionChoice) -> Iterator[np.ndarray]:
+        self.paths.append(LabeledPath("final", motion.name, choice.path))
         self.executor.allow(())
         yield from self.executor.go(choice)
 
-    def _leg(
+    def _motion_choice(
         self, name: str, k: int, goal: Pose, allowed: tuple[tuple[str, str], ...] = (), held: Pose | None = None
     ) -> MotionChoice:
-        """A motion with book k, which is in the hand where `held` (`tcp_from_object`) is given."""
+        """Return a motion with book k, which is in the hand if `held` (`tcp_from_object`) is given."""
         executor, target = self.executor, self.task.objects[k]
         body = executor.empty if held is None else executor.body_with(target.shape, held)
         around = executor.world_model.obstacles_if_holding(executor.observation, None if held is None else k)
@@ -207,12 +216,12 @@ class ShelveProgram:
 
 
 def _named_obstacles(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Contacts of hand and books while a book is taken or let go: the hand's capsules contain more than the hand."""
+    """Return contacts of the hand with books during grasp and release: its capsules contain more than the hand."""
     return tuple((part, name) for part in ("fingers", "hand") for name in names)
 
 
 def _gripper_after(shown: Demonstration, name: str, task: TaskDescription) -> float:
-    """What opens this gripper as far as the demonstrated one was opened at the end of a motion."""
+    """Return the action that opens this gripper as far as the demonstrated one at the end of a motion."""
     assert shown.gripper is not None
     action = float(shown.gripper[shown.segment(name).stop + 1])
     if shown.robot == task.robot or action >= 0.0:

@@ -1,7 +1,7 @@
-"""Stacking from the demonstration of ONE block: fetch and place, again and again.
+"""Stacking from the demonstration of ONE block: fetch and place, repeatedly.
 
-Only the goals are new: a grasp is where the demonstrated hand was relative to the object it took, a release
-is where the object must end, seen from how the hand holds it.
+Only the goals are new: a grasp is the demonstrated pose of the hand relative to the grasped object, a release
+is the goal pose of the object, given its pose in the hand.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription, TaskObject
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.imitation.demonstration import Demonstration
+from ...envs import TaskDescription, TaskObject
+from ...planner import Demonstration, Pose, PosePath
 from ...planner.imitation.segmentation import resampled, trimmed
 from ...planner.imitation.tsia import departure
 from ..policy import LabeledPath
@@ -26,9 +25,13 @@ if TYPE_CHECKING:
 
 
 def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
-    """All `object_from_tcp` that repeat the demonstrated grasp on an object, one per symmetric yaw.
+    """Return all `object_from_tcp` that repeat the demonstrated grasp on an object, one per symmetric yaw.
 
     The demonstrated grasp is turned so that the fingers close along the object's narrower horizontal axis.
+
+    Args:
+        demonstration: with the segment "approach".
+        target: the object.
     """
     object_pose = demonstration.segment("approach").reference_pose
     shown = object_pose.inverse() @ demonstration.segment_path("approach")[-1]
@@ -39,16 +42,30 @@ def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
 
 
 def releases(target: TaskObject, goal: Pose, tcp_from_object: Pose, height: float) -> list[Pose]:
-    """All poses of the tcp at which the held object is above its goal, one per symmetric yaw."""
+    """Return all poses of the tcp with the held object above its goal, one per symmetric yaw.
+
+    Args:
+        target: the object.
+        goal: of the object.
+        tcp_from_object: pose of the object in the hand.
+        height: above the goal [m].
+    """
     above = Pose.from_position_quaternion([0, 0, height]) @ goal
     return [above @ Pose.from_yaw([0, 0, 0], yaw) @ tcp_from_object.inverse() for yaw in target.symmetric_yaws]
 
 
 class StackProgram:
-    """The program of one episode; iterate over `actions()`."""
+    """The program of one episode; iterate over `actions()`.
+
+    Args:
+        task: the task.
+        shown: the demonstration.
+        settings: see `ProgramSettings`.
+        executor: of the arm.
+    """
 
     SEGMENTS = ("approach", "transfer")
-    """What a demonstration of this task must have."""
+    """Segments required of a demonstration of this task."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.shown, self.settings, self.executor = task, shown, settings, executor
@@ -63,7 +80,7 @@ class StackProgram:
         ]
 
     def actions(self) -> Iterator[np.ndarray]:
-        """Fetch and place each object in order, then withdraw; what is placed or in the hand already is left so."""
+        """Fetch and place each object in order, then withdraw; objects already placed or fetched are not repeated."""
         first, in_hand = divmod(int(self.executor.observation["motion_index"][0]), 2)
         for k in range(first, len(self.task.objects)):
             if in_hand and k == first:
@@ -73,12 +90,12 @@ class StackProgram:
                 yield from self._fetch(k)
             yield from self._place(k)
         last = len(self.task.objects) - 1
-        away = self.executor.departure_path(self._leg(last, self.approach, (), leaving=self.withdrawal))
+        away = self.executor.departure_path(self._motion_choice(last, self.approach, (), leaving=self.withdrawal))
         if away is not None:
             yield from self.executor.follow(away, exact=False)
 
     def _wanted(self, k: int) -> tuple[tuple[str, str], ...]:
-        """Contacts that belong to moving object k: of fingers with it and with what it stands on, of it with that."""
+        """Return the contacts needed to move object k: of the fingers with it, of both with its support."""
         objects = self.task.objects
         under = [TABLE] + [objects[j].name for j in (k - 1,) if j >= 0]
         own = [("fingers", objects[j].name) for j in (k - 1, k) if j >= 0]
@@ -99,7 +116,7 @@ class StackProgram:
         lift = self._lift(k, grasped)
         if lift is not None:
             yield from self.executor.leave(lift, OFF)
-        # the object slips a little while it is lifted: the goal is computed from how it is held now
+        # the object slips a little during the lift: the goal is computed from its present pose in the hand
         held = self.executor.lifted()
         choice = self.executor.choose(self._placement(k, held))
         path = choice.path if lift is None else lift.joined(choice.path)
@@ -110,27 +127,27 @@ class StackProgram:
         self.executor.release()
 
     def _lift(self, k: int, grasped: Pose) -> PosePath | None:
-        """Off what the object stands on, as shown; None where it is in the air already."""
+        """Return the demonstrated lift of an object off its support; None if the object is already in the air."""
         pose, half = self.executor.object_pose(k), 0.5 * float(self.task.objects[k].size[2])
         if pose.position[2] - half > self.task.table_height + OFF:
             return None
         return self.executor.departure_path(self._placement(k, grasped, leaving=self.transfer))
 
     def _chosen_fetch(self, k: int) -> ChosenMotion:
-        """The grasp from which the object can also be placed."""
+        """Return the grasp from which the object can also be placed."""
         target, executor = self.task.objects[k], self.executor
         ways = grasps(self.shown, target)
         goals = tuple(executor.object_pose(k) @ grasp for grasp in ways)
-        leg = self._leg(k, self.approach, goals, leaving=self.withdrawal if k else None)
-        return executor.choose(leg, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
+        motion = self._motion_choice(k, self.approach, goals, leaving=self.withdrawal if k else None)
+        return executor.choose(motion, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
 
     def _placement(self, k: int, held: Pose, leaving: PosePath | None = None) -> MotionChoice:
-        """Object k from the hand to its goal."""
+        """Return the motion of object k from the hand to its goal."""
         target = self.task.objects[k]
         goals = releases(target, self.executor.goal_pose(k), held, self.settings.release_height)
-        return self._leg(k, self.transfer, tuple(goals), held=held, leaving=leaving, done=self._lifted)
+        return self._motion_choice(k, self.transfer, tuple(goals), held=held, leaving=leaving, done=self._lifted)
 
-    def _leg(
+    def _motion_choice(
         self,
         k: int,
         demonstrated: PosePath,

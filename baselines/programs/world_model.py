@@ -1,4 +1,4 @@
-"""What an arm has to keep clear of, read from observations: the table, the objects, the obstacles."""
+"""Obstacles of an arm, read from observations: the table, the objects, the scheduled obstacles."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...envs.core.description import TaskDescription
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Capsule, Obstacle, Shape, Sphere
+from ...envs import TaskDescription
+from ...planner import Box, Capsule, Obstacle, Pose, Shape, Sphere
+from ...planner.geometry.shapes import SHAPE_KIND
 from ..policy import Observation
 
 TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
-"""Distances [m] to keep from what the task itself brings close: things are put down there."""
-MAX_OBSTACLES = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
+"""Margins [m] of table and objects, small because the task itself comes close: objects are placed there."""
+OBSTACLE_KEYS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
 FREE_MARGIN = 0.010
-"""Distance [m] to keep where nothing has to be near: a moving arm lags some millimetres behind what guards it."""
+"""Margin [m] where no approach is needed: a moving arm lags some millimeters behind its guarded pose."""
 MOVED = 1e-3
-"""Change of a pose vector's entry from which an object is in another place."""
+"""Change of a pose vector's entry from which an object counts as moved."""
 
 
 class WorldModel:
-    """The obstacles of one arm, renewed only when something has moved.
+    """The obstacles of one arm, updated only when an object has moved.
 
     Args:
         task: with the fixtures and the objects' shapes.
-        table_margin: distance [m] to keep from the table.
-        margin: distance [m] to keep from objects and furniture.
+        table_margin: margin [m] of the table.
+        margin: margin [m] of objects and furniture.
 
     Attributes:
-        allowed: contacts that are wanted: (part of the body or "held", name of a thing).
+        allowed: allowed contacts: (part of the body or "held", name of an object).
     """
 
     def __init__(self, task: TaskDescription, *, table_margin: float = TABLE_MARGIN, margin: float = OBJECT_MARGIN):
@@ -39,49 +39,54 @@ class WorldModel:
         self._task, self._held, self._margin = task, None, margin
         self._fixed = tuple(replace(f, margin=table_margin) if f.name == TABLE else f for f in task.fixtures)
         self._poses = np.full((len(task.objects) + len(task.furniture), 7), np.inf)
-        self._intruders = np.zeros((task.obstacles, 15))
+        self._obstacle_rows = np.zeros((task.obstacles, 15))
         self._things: tuple[Obstacle, ...] = ()
         self._seen: tuple[Obstacle, ...] = ()
 
     def allow(self, contacts: Sequence[tuple[str, str]]) -> None:
-        """The contacts that are wanted from now on, besides those that nobody needs to look at."""
+        """Set the allowed contacts from now on, besides those the task always allows."""
         self.allowed = (*self._task.touching, *contacts)
 
     def name(self, index: int) -> str:
-        """Of an object."""
+        """Return the name of an object."""
         return self._task.objects[index].name
 
     def set_margin(self, margin: float) -> None:
-        """The distance [m] to keep from objects and furniture from now on."""
+        """Set the margin [m] of objects and furniture from now on."""
         self._margin = margin
         self._poses[:] = np.inf
 
     def exclude(self, index: int | None) -> None:
-        """From now on an object is in the hand, or none is."""
+        """Exclude the object in the hand from now on; None: the hand is empty."""
         self._held = index
         self._poses[:] = np.inf
 
     def obstacles(self, observation: Observation) -> tuple[Obstacle, ...]:
-        """The obstacles as observed; the same tuple while nothing has moved."""
+        """Return the observed obstacles; the same tuple while nothing has moved."""
         poses = self._places(observation)
         moved = np.abs(poses - self._poses).max(axis=1) > MOVED
         if self._held is not None:
             moved[self._held] = np.isinf(self._poses[self._held, 0])
-        intruders = np.column_stack([observation[key].reshape(len(self._intruders), -1) for key in MAX_OBSTACLES])
+        rows = np.column_stack([observation[key].reshape(len(self._obstacle_rows), -1) for key in OBSTACLE_KEYS])
         if moved.any():
             self._poses[:] = poses
             self._things = self._standing(poses, self._held)
-        if moved.any() or (intruders != self._intruders).any():
-            self._intruders = intruders
+        if moved.any() or (rows != self._obstacle_rows).any():
+            self._obstacle_rows = rows
             self._seen = (*self._things, *obstacles_in(observation))
         return self._seen
 
     def obstacles_if_holding(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
-        """The obstacles as observed, if an object were in the hand."""
+        """Return the obstacles as if an object were in the hand.
+
+        Args:
+            observation: the present one.
+            held: index of the object; None: the hand is empty.
+        """
         return (*self._standing(self._places(observation), held), *obstacles_in(observation))
 
     def _places(self, observation: Observation) -> np.ndarray:
-        """Poses (n, 7) of all objects and furniture."""
+        """Return the poses (n, 7) of all objects and furniture."""
         if not self._task.furniture:
             return observation["object_pose"]
         return np.concatenate([observation["object_pose"], observation["furniture_pose"]])
@@ -99,7 +104,7 @@ class WorldModel:
 
 
 def obstacles_in(observation: Observation) -> tuple[Obstacle, ...]:
-    """What is in the way, as observed."""
+    """Return the observed scheduled obstacles."""
     found = []
     for slot in np.flatnonzero(observation["obstacle_active"]):
         pose, velocity = Pose.from_vector(observation["obstacle_pose"][slot]), observation["obstacle_velocity"][slot]
@@ -109,7 +114,7 @@ def obstacles_in(observation: Observation) -> tuple[Obstacle, ...]:
 
 
 def _shape(kind: int, size: np.ndarray) -> Shape:
-    """The shape of an observed obstacle; see the observation's `obstacle_shape` and `obstacle_size`."""
-    if kind == 2:
+    """Return the shape of an observed obstacle; see the observation's `obstacle_shape` and `obstacle_size`."""
+    if kind == SHAPE_KIND.box:
         return Box((float(size[0]), float(size[1]), float(size[2])))
-    return Sphere(float(size[0])) if kind == 1 else Capsule(float(size[0]), float(size[2]))
+    return Sphere(float(size[0])) if kind == SHAPE_KIND.sphere else Capsule(float(size[0]), float(size[2]))

@@ -1,1 +1,1 @@
-"""Scripted demonstrations, and those imported from recordings."""
+"""Scripted demonstrations, and demonstrations imported from recordings."""

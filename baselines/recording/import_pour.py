@@ -1,7 +1,7 @@
-"""A person's pouring, recorded as poses of a real Panda's hand without any glass, made into a demonstration.
+"""Conversion of a person's pouring, recorded as poses of a real Panda's hand without glasses, to a demonstration.
 
-Where the glasses stood was not recorded. The source is taken to be held as the simulated hand holds it, and the
-target to stand where the motion ends: below and in front of the lip while it is tilted most.
+The places of the glasses were not recorded. The source is assumed to be held as in the simulated hand, and the target
+to stand where the motion ends: below and in front of the lip at its largest tilts.
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ import numpy as np
 
 from ...envs.pour.geometry import GLASSES, SOURCE, TARGET, tcp_from_glass
 from ...envs.scene.scene_objects import extents
+from ...planner import Demonstration, Pose, PosePath, Segment
 from ...planner.errors import BadDemonstration
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.imitation.demonstration import Demonstration, Segment
 
 PANDA_BASE = (-0.56, 0.0, 0.912)
-"""Where the simulated Panda stands [m]."""
+"""Position of the simulated Panda's base in the world [m]."""
 BEHIND_TCP = 0.0064
-"""The grip site lies behind the tcp that Franka's controller records, along the approach [m]."""
+"""Distance [m] of the grip site behind the tcp that Franka's controller records, along the approach direction."""
 POURS = np.deg2rad(92.0)
-"""Tilt from which on the lip is taken to be above the target."""
+"""Tilt [rad] above which the lip is assumed to be above the target."""
 AHEAD, BELOW = 0.020, 0.015
-"""The target's axis in front of the lip's mean place then, and its rim below the lip's lowest [m]."""
+"""Distances [m] of the target's axis in front of the lip's mean position at these tilts, and of its rim below the lip's
+lowest point."""
 TURN = np.deg2rad(20.0)
-"""Everything is turned about the robot's vertical axis by this: then both glasses stand over the table. For the arm
-nothing is changed by it but its first joint."""
+"""Rotation [rad] of the whole recording about the robot's vertical axis, which puts both glasses above the table. Only
+the arm's first joint is affected."""
 
 
 class Placed(NamedTuple):
-    """A recording with glasses.
+    """Recording with glasses.
 
     Attributes:
-        demonstration: with the one segment "carry".
-        stands: (2, 3) tops [m] of stands on which the glasses stand as shown, source first.
+        demonstration: demonstration with the single segment "carry".
+        stands: (2, 3) tops [m] of the stands on which the glasses are placed in the demonstration, source first.
     """
 
     demonstration: Demonstration
@@ -43,10 +43,10 @@ class Placed(NamedTuple):
 
 
 def pour_from_poses(recorded: Demonstration) -> Placed:
-    """The demonstration "carry" of a recording that begins with the source in the hand and ends tilted.
+    """Return the demonstration "carry" of a recording that starts with the source in the hand and ends with it tilted.
 
     Args:
-        recorded: poses of the hand in the robot's base, fingers closing along y, approach along z.
+        recorded: poses of the hand in the robot's base frame; fingers close along y, approach along z.
 
     Raises:
         BadDemonstration: the glass is never tilted enough to pour.
@@ -78,7 +78,7 @@ def pour_from_poses(recorded: Demonstration) -> Placed:
 
 
 def _lips(source: PosePath, forward: np.ndarray) -> np.ndarray:
-    """(n, 3) the point of the rim that is in front at the start, along the way [m]."""
+    """Return the positions (n, 3) [m] of the rim's point that faces forward at the start, along the path."""
     glass = GLASSES[SOURCE]
     side = source[0].rotation.T @ forward
     return source.with_tool(

@@ -1,4 +1,4 @@
-"""The script of the demonstration `pour`: its waypoints, in the open. A script moved this arm, not a person."""
+"""Script of the demonstration `pour` with explicit waypoints. A script moved this arm, not a person."""
 
 from __future__ import annotations
 
@@ -8,26 +8,25 @@ from typing import Any
 import numpy as np
 
 from ...envs.pour.geometry import BACK, GLASSES, SOURCE, TARGET, TILTED, UP, grasp, pouring
-from ...planner.geometry.pose import Pose
-from ...planner.imitation.demonstration import Demonstration
+from ...planner import Demonstration, Pose
 from .scripted_recorder import ScriptedMotion, Waypoint, recorded
 
 YAW = np.deg2rad(75.0)
-"""Direction of the hand: level, away from the arm and across, so that it can tilt forward above the target."""
+"""Yaw [rad] of the hand's level approach: away from the arm and across, so that it can tilt forward over the target."""
 SHORT = 0.13
-"""How far before the source the hand gets level with it [m]."""
+"""Distance [m] before the source at which the hand is level with it."""
 LIFT = 0.12
 """Height [m] of the lift."""
 HALF = np.deg2rad(65.0)
-"""Tilt with which the lip comes to the pour point: with less, the glass would be where the target is."""
+"""Tilt [rad] with which the lip reaches the pour point: with a smaller one, the glass would collide with the target."""
 CAREFUL, SLOW = 0.6, 0.1
-"""Largest speeds with beads at the lip [rad/s] and at the grasp [m/s]."""
+"""Largest angular speed with beads at the lip [rad/s], and largest speed at the grasp [m/s]."""
 DRAIN = 0.8
-"""Seconds of holding the glass tilted."""
+"""Time [s] for which the glass is held tilted."""
 
 
 def pour_script(glasses: np.ndarray) -> Iterator[ScriptedMotion]:
-    """The motions for glasses at poses (2, 7)."""
+    """Yield the motions for glasses at poses (2, 7)."""
     glass, center = GLASSES[SOURCE], glasses[SOURCE, :3]
     rim = glasses[TARGET, :3] + [0.0, 0.0, 0.5 * GLASSES[TARGET].height]
     hand = grasp(glass, center, YAW)
@@ -43,10 +42,11 @@ def pour_script(glasses: np.ndarray) -> Iterator[ScriptedMotion]:
 
 
 def record_pour(env: Any) -> Demonstration:
-    """The demonstration, given in `onedemo/Pour-v0` (unwrapped) at level L0.
+    """Record the demonstration in `onedemo/Pour-v0` (unwrapped) at level L0.
 
     Raises:
-        BadDemonstration: the simulator saw no success.
+        PlanFailed: a waypoint cannot be reached.
+        BadDemonstration: the simulator reported no success.
     """
     observation, _ = env.reset(seed=0, options={"level": "L0"})
     return recorded(env, observation, pour_script(observation["object_pose"]), name="pour")

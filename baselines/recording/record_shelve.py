@@ -1,4 +1,4 @@
-"""The script of the demonstration `shelve`, in the LOWER shelf: its waypoints, in the open. A script moved this arm."""
+"""Script of the demonstration `shelve`, in the LOWER shelf, with explicit waypoints. A script moved this arm."""
 
 from __future__ import annotations
 
@@ -7,28 +7,32 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.imitation.demonstration import Demonstration
+from ...planner import Demonstration, Pose
 from .scripted_recorder import ScriptedMotion, Waypoint, recorded
 
 GRASP = Pose.from_position_quaternion([-0.055, 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
-"""Hand (tcp) in the book's frame: 25 mm behind the spine, level, fingers on the covers."""
+"""Pose of the hand (tcp) in the book's frame: 25 mm behind the spine, level, fingers on the covers."""
 BEFORE, LIFT, WAY_IN = 0.13, 0.15, 0.22
-"""Ways [m]: to the grasp, up from the stand, into the shelf and out of it again."""
+"""Distances [m]: approach to the grasp, lift off the stand, motions into and out of the shelf."""
 ABOVE = 0.003
-"""Height above the shelf's board at which the book goes in and is let go [m]."""
+"""Height [m] above the shelf board at which the book is inserted and released."""
 OPENING = 0.047
-"""Gap between the finger pads that lets a book go [m]: a wider one would push its neighbors."""
+"""Gap [m] between the finger pads that releases a book: a wider one would push its neighbors."""
 SLOW = 0.12
 """Speed into and out of the shelf [m/s]."""
 
 
 SCENE = {"n_books": 1, "shelf": "lower"}
-"""Arguments of the environment that the demonstration is given in."""
+"""Arguments of the environment in which the demonstration is recorded."""
 
 
 def shelve_script(observation: dict[str, np.ndarray], width: float) -> Iterator[ScriptedMotion]:
-    """The motions for what is observed, with a gripper that opens to `width` [m]."""
+    """Yield the motions for an observed scene.
+
+    Args:
+        observation: observation with `object_pose` and `goal_pose`, (n, 7) each.
+        width: largest opening of the gripper [m].
+    """
     grasp = Pose.from_vector(observation["object_pose"][0]) @ GRASP
     release = _up(ABOVE) @ Pose.from_vector(observation["goal_pose"][0]) @ GRASP
     lifted, before = _up(LIFT) @ grasp, release @ _along(-WAY_IN)
@@ -46,15 +50,16 @@ def _up(height: float) -> Pose:
 
 
 def _along(height: float) -> Pose:
-    """A way along the direction that the hand points in, in the hand's frame."""
+    """Return a displacement [m] along the hand's approach direction, in the hand's frame."""
     return Pose.from_position_quaternion([0.0, 0.0, height])
 
 
 def record_shelve(env: Any) -> Demonstration:
-    """The demonstration, given in `onedemo/Shelve-v0` (unwrapped) made with `SCENE`, at level L0.
+    """Record the demonstration in `onedemo/Shelve-v0` (unwrapped), made with `SCENE`, at level L0.
 
     Raises:
-        BadDemonstration: the simulator saw no success.
+        PlanFailed: a waypoint cannot be reached.
+        BadDemonstration: the simulator reported no success.
     """
     observation, _ = env.reset(seed=0, options={"level": "L0"})
     return recorded(env, observation, shelve_script(observation, env.task.gripper_width[0]), name="shelve")

@@ -1,20 +1,20 @@
-"""The scripted demonstrations by task."""
+"""Scripted demonstrations by task."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from ...planner.imitation.demonstration import Demonstration
+from ...planner import Demonstration
 from .record_pour import record_pour
 from .record_shelve import SCENE, record_shelve
 
 
 class Recorder(NamedTuple):
-    """How a demonstration is made.
+    """Recorder of a demonstration.
 
     Attributes:
-        record: takes the environment of the task, unwrapped, and gives the demonstration in it.
+        record: takes the task's environment, unwrapped, and returns the demonstration recorded in it.
         scene: arguments of that environment.
     """
 
@@ -23,3 +23,4 @@ class Recorder(NamedTuple):
 
 
 RECORDERS = {"pour": Recorder(record_pour), "shelve": Recorder(record_shelve, SCENE)}
+"""Recorder of each scripted task."""

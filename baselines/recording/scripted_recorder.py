@@ -1,7 +1,7 @@
-"""A simulated arm moved along waypoints under physics, and recorded from its joint encoders as a demonstration.
+"""Recording of a demonstration: a simulated arm follows scripted waypoints under physics.
 
-Between waypoints the tcp goes along one screw, starting and stopping smoothly. The recording holds what the encoders
-measured, lag and sag included, not what the script wanted.
+Between waypoints the tcp follows one screw, with a smooth start and stop. The demonstration contains the measured joint
+positions, lag and sag included, not the commanded ones.
 """
 
 from __future__ import annotations
@@ -11,33 +11,31 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...planner import Arm, Demonstration, Pose, PosePath, Segment
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.errors import BadDemonstration, PlanFailed
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.imitation.demonstration import Demonstration, Segment
-from ...planner.robot.arm import Arm
 
 LINEAR, ANGULAR = 0.25, 1.2
-"""Peak speeds of the tcp [m/s, rad/s] where a waypoint does not say others."""
+"""Default peak speeds of the tcp [m/s, rad/s]."""
 JOINT_SPEED = 0.6
-"""Largest share of a joint's speed limit: more is done more slowly."""
+"""Largest share of a joint's speed limit; faster motions are slowed down."""
 PEAK = 1.5
-"""Of the smooth step's speed, in means."""
+"""Ratio of peak to mean speed of the smooth step."""
 CATCH_UP = 0.4
-"""Seconds of standing still at the end of a motion, in which the servos catch up."""
+"""Time [s] of standing still at the end of a motion, in which the servos catch up."""
 JUDGED = 1.0
-"""Seconds of standing still at the end of the script, in which the simulator judges."""
+"""Time [s] of standing still at the end of the script, in which the simulator judges success."""
 
 
 class Waypoint(NamedTuple):
-    """Where the tcp goes next.
+    """Next pose of the tcp.
 
     Attributes:
         tcp: pose in the world.
         linear: peak speed [m/s].
         angular: peak speed [rad/s].
-        hold: seconds of standing still there.
+        hold: time [s] of standing still at the pose.
     """
 
     tcp: Pose
@@ -47,15 +45,15 @@ class Waypoint(NamedTuple):
 
 
 class ScriptedMotion(NamedTuple):
-    """What becomes one segment of the demonstration.
+    """Motion that becomes one segment of the demonstration.
 
     Attributes:
-        name: of the segment.
-        waypoints: in order.
-        reference: name of the object that the end is relative to; its pose is taken there as observed. "": the world.
-        held: name of the object in the hand, "" if it is empty.
-        gripper: action at the end: 1 closes, below 0 opens to that part of the width, 0 leaves it.
-        pause: seconds given to the gripper.
+        name: name of the segment.
+        waypoints: waypoints in order.
+        reference: name of the object that the end is relative to, with its pose observed at the end; "": the world.
+        held: name of the object in the hand; "" if the hand is empty.
+        gripper: gripper action at the end: 1 closes, a negative value opens to that share of the width, 0 does nothing.
+        pause: time [s] for the gripper action.
     """
 
     name: str
@@ -67,7 +65,7 @@ class ScriptedMotion(NamedTuple):
 
 
 class _Recorder:
-    """Steps an environment and keeps what the encoders say."""
+    """Stepper of an environment that records the encoders."""
 
     def __init__(self, env: Any, observation: dict[str, np.ndarray], gripper: float):
         self.env, self.arm = env, env.task.arms[0]
@@ -78,7 +76,7 @@ class _Recorder:
         self._free = 0
 
     def step(self, speeds: np.ndarray) -> None:
-        """One control step with joint speeds (dof,) [rad/s]."""
+        """Take one control step with joint speeds (dof,) [rad/s]."""
         action = np.append(speeds / self.arm.velocity_limits, self.gripper)
         self.observation, *_, self.info = self.env.step(action)
         self.succeeded |= bool(self.info["success"])
@@ -86,7 +84,7 @@ class _Recorder:
         self.commands.append(self.gripper)
 
     def go(self, waypoint: Waypoint) -> None:
-        """Go to a waypoint and wait there."""
+        """Move to a waypoint and wait there."""
         dt = self.env.control_dt
         for q in _joints_to(self.arm, self.q, waypoint, dt):
             self.step((q - self.q) / dt)
@@ -99,7 +97,7 @@ class _Recorder:
             self.step(np.zeros(self.arm.dof))
 
     def motion(self, motion: ScriptedMotion) -> Segment:
-        """Do a motion; the segment that it became."""
+        """Execute a motion and return its segment."""
         start, names = max(self._free, len(self.joints) - 1), [each.name for each in self.env.task.objects]
         for waypoint in motion.waypoints:
             self.go(waypoint)
@@ -125,19 +123,19 @@ def recorded(
     licence: str = "MIT",
     gripper: float = -1.0,
 ) -> Demonstration:
-    """The demonstration that a scripted arm gives in an environment that has just been reset.
+    """Record the demonstration of a scripted arm in an environment that has just been reset.
 
     Args:
-        env: an environment of this project (unwrapped), one arm, in the mode `joint_velocity`.
-        observation: what its reset returned.
-        motions: the script; asked for one by one, so that it may look at the environment in between.
-        name: of the demonstration.
-        licence: of the recording.
-        gripper: action at the start.
+        env: environment of this project (unwrapped) with one arm, in the control mode `joint_velocity`.
+        observation: observation of the reset.
+        motions: motions of the script, requested one by one, so that the script may look at the environment in between.
+        name: name of the demonstration.
+        licence: license of the recording.
+        gripper: gripper action at the start.
 
     Raises:
         PlanFailed: "ik_or_limit", a waypoint cannot be reached.
-        BadDemonstration: the simulator saw no success: what fails is not shown.
+        BadDemonstration: the simulator reported no success: failures are not recorded.
     """
     recorder = _Recorder(env, observation, gripper)
     segments = tuple(recorder.motion(motion) for motion in motions)
@@ -163,7 +161,7 @@ def recorded(
 
 
 def _joints_to(arm: Arm, q: np.ndarray, waypoint: Waypoint, dt: float) -> np.ndarray:
-    """Joints (n, dof) at every tick of the way to a waypoint; slower where a joint would be too fast."""
+    """Return the joints (n, dof) at every tick of the motion to a waypoint; slower where a joint would be too fast."""
     start = arm.fk(q)
     distance, angle = start.distance_to(waypoint.tcp)
     seconds = PEAK * max(distance / waypoint.linear, angle / waypoint.angular, dt)
@@ -174,7 +172,7 @@ def _joints_to(arm: Arm, q: np.ndarray, waypoint: Waypoint, dt: float) -> np.nda
 
 
 def _followed(arm: Arm, q: np.ndarray, start: Pose, end: Pose, seconds: float, dt: float) -> np.ndarray:
-    """Joints at every tick of a screw from start to end, each near those before."""
+    """Return the joints (n, dof) at every tick of a screw from start to end, each near the previous ones."""
     s = np.linspace(0.0, 1.0, max(2, round(seconds / dt)) + 1)[1:]
     joints = []
     for row in dq.sclerp(start.dq, end.dq, s * s * (3.0 - 2.0 * s)):

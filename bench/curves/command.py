@@ -1,4 +1,4 @@
-"""`onedemo curves`: trainings of one task in one figure, beside what needs no step of the environment."""
+"""`onedemo curves`: trainings of one task in one figure, next to methods that need no environment steps."""
 
 from __future__ import annotations
 
@@ -7,21 +7,22 @@ import io
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...baselines.learning.learned_policy import METHODS
 from ...baselines.learning.actor_card import METHOD as RESIDUAL
-from ...planner.errors import BadConfig
+from ...baselines.learning.learned_policy import METHODS
+from ...configs import BadConfig
+from ..atomic_files import write_whole
 from ..console import COMMAND_LINE, console, labeled
 from ..document.document import Block, Document, Entry, Picture, Pictures, Table
-from ..atomic_files import write_whole
+from ..document.markdown_page import markdown_of
 from ..report.groups import groups_of
+from ..report.read_runs import read_run
 from ..statistics import Rate
 from ..train.curve_figure import Line, draw_curves, mean_interval, summary_rows
-from ..document.markdown_page import markdown_of
-from ..report.read_runs import read_run
 from ..train.folder import CONFIG
 from .read_trainings import Training, by_label, read_training
 
 COLUMNS = ("method", "steps", "seeds", "success", "low", "high", "return", "return_low", "return_high")
+"""Columns of the CSV file."""
 HEAD = ("method", "environment steps", "seeds", "success", "95 %", "return", "95 %", "minutes a seed")
 CAPTION = (
     "Success and return of episodes on frozen scenarios. Returns are sums of the dense reward, at most 150; what is "
@@ -32,11 +33,16 @@ CAPTION = (
 
 
 def run_curves(folders: list[Path], run: Path | None, output: Path) -> None:
-    """Draw the curves, write their numbers, and say where they are.
+    """Draw the curves, write their numbers, and print the paths of the files.
+
+    Args:
+        folders: folders of trainings.
+        run: run folder with methods that need no training, or None.
+        output: folder for the files.
 
     Raises:
-        BadConfig: a folder is of no training or of another task, nothing has been evaluated, or the run has no method
-            that needs no training.
+        BadConfig: a folder holds no training or one of another task, nothing has been evaluated, or the run has no
+            method without training.
     """
     found = evaluated([read_training(folder) for folder in {folder.resolve(): folder for folder in folders}.values()])
     setting = found[0].setting
@@ -72,10 +78,10 @@ def run_curves(folders: list[Path], run: Path | None, output: Path) -> None:
 
 
 def evaluated(trainings: list[Training]) -> list[Training]:
-    """Those with an evaluation; the others are named on standard error.
+    """Return the trainings that have an evaluation; the others are named on standard error.
 
     Raises:
-        BadConfig: there are none.
+        BadConfig: no training has one.
     """
     found = [training for training in trainings if training.curves]
     if not found:
@@ -88,10 +94,17 @@ def evaluated(trainings: list[Training]) -> list[Training]:
 
 
 def rates_of(run: Path, setting: tuple[str, str, str]) -> dict[str, tuple[str, Rate]]:
-    """The methods of a run on a setting that need no training, and their successes, by label.
+    """Return the methods of a run that need no training, with their success rates.
+
+    Args:
+        run: run folder.
+        setting: task, robot and level.
+
+    Returns:
+        Method and rate, by label.
 
     Raises:
-        BadConfig: the run has none on it.
+        BadConfig: the run has no such method in this setting.
     """
     groups = [group for group in groups_of(read_run(run)) if group.records]
     found = [group for group in groups if group.setting == setting and group.cell.method not in (*METHODS, RESIDUAL)]
@@ -103,7 +116,14 @@ def rates_of(run: Path, setting: tuple[str, str, str]) -> dict[str, tuple[str, R
 
 
 def table_of(trainings: Mapping[str, Training], shown: Mapping[str, Rate]) -> Table:
-    """What needs no training, then each training at its end, or as far as all of its seeds have come."""
+    """Return the table of results.
+
+    A training's row is its last evaluation that all of its seeds have had.
+
+    Args:
+        trainings: trainings by label.
+        shown: success rates of methods without training, by label.
+    """
     rows: list[list[Entry]] = [
         [label, "0", "", f"{rate.share:.0%} of {rate.episodes}", f"{rate.low:.0%} to {rate.high:.0%}", "", "", ""]
         for label, rate in shown.items()
@@ -122,7 +142,7 @@ def table_of(trainings: Mapping[str, Training], shown: Mapping[str, Rate]) -> Ta
 
 
 def csv_of(trainings: Mapping[str, Training]) -> str:
-    """All evaluations that all seeds have had; steps of "bc" are of the gradient."""
+    """Return the CSV text of all evaluations that all seeds have had; the steps of "bc" are gradient steps."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)

@@ -1,4 +1,4 @@
-"""Folders of trainings as `onedemo curves` reads them: the curves of each, and a name that tells it from the others."""
+"""Reading of training folders for `onedemo curves`, with a distinct label for each training."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from ...configs import BadConfig, TrainConfig
 from ...configs.learner_defaults import DEFAULTS
-from ...configs.train_config import BESIDE, TrainConfig
-from ...planner.errors import BadConfig
-from ..train.curve_figure import Curves
+from ...configs.train_config import BESIDE
 from ..method_table import place_of
+from ..train.curve_figure import Curves
 from ..train.folder import CONFIG, curve_of, seeds_of
 
 
 class Training(NamedTuple):
-    """What a training has come to.
+    """Curves of a training.
 
     Attributes:
-        folder: of it.
-        config: of it.
-        curves: the evaluations of each seed that has any.
+        folder: folder of the training.
+        config: its config.
+        curves: evaluations of each seed that has any.
     """
 
     folder: Path
@@ -38,10 +38,10 @@ class Training(NamedTuple):
 
 
 def read_training(folder: Path) -> Training:
-    """The config of a training's folder, and the evaluations of its seeds so far, perhaps none.
+    """Read the config of a training's folder and the evaluations of its seeds so far, possibly none.
 
     Raises:
-        BadConfig: it is none.
+        BadConfig: the folder holds no training, or a seed's state is damaged.
     """
     file = folder / CONFIG
     if not file.is_file():
@@ -55,7 +55,10 @@ def read_training(folder: Path) -> Training:
 
 
 def by_label(trainings: Sequence[Training]) -> dict[str, Training]:
-    """By algorithm, in the order of tables; where there are several of one, by what differs, too."""
+    """Return the trainings by label, in the order of tables.
+
+    A label is the algorithm and, for several trainings of one algorithm, the settings that differ.
+    """
     trainings = sorted(trainings, key=lambda each: place_of(each.config.algorithm))
     labels = []
     for each in trainings:
@@ -72,7 +75,7 @@ def by_label(trainings: Sequence[Training]) -> dict[str, Training]:
 
 
 def flat(config: TrainConfig) -> dict[str, Any]:
-    """All that decides how a seed's curve goes, with defaults, by dotted key."""
+    """Return all settings that determine a seed's curve, defaults included, by dotted key."""
     values = config.model_dump(mode="json", exclude={*BESIDE, "env", "learner"})
     learner = {**DEFAULTS[config.algorithm], **config.learner}
     return {

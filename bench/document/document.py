@@ -1,4 +1,4 @@
-"""What a report consists of, whatever it is printed as: headings, paragraphs, tables, pictures, code, links."""
+"""Content of a report, independent of its format: headings, paragraphs, tables, pictures, code, links."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Paragraph:
-    """A text of our own words and of others'."""
+    """A text, which may quote untrusted words."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Bullets:
-    """Short texts one below the other."""
+    """A list of short texts."""
 
     items: list[str]
 
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """Lines to be copied."""
+    """Lines to copy."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A word that leads to a file of the folder.
+    """A word linked to a file of the report's folder.
 
     Attributes:
-        text: what is shown.
-        file: path relative to the report, made of letters, digits, `-_./` and `%` alone; see `escaping.link_to`.
+        text: the displayed word.
+        file: path relative to the report, of letters, digits, `-_./` and `%` only; see `untrusted_text.link_to`.
     """
 
     text: str
@@ -50,17 +50,18 @@ class Link:
 
 
 Entry = str | Rate | Link
+"""Entry of a table."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows under a head.
+    """Rows below a head.
 
     Attributes:
         head: names of the columns.
-        rows: as many entries each; a rate is shown with its interval.
-        words: how many of the first columns hold words; numbers follow.
-        title: "" or what it is called where it is too long to be shown at once.
+        rows: one entry per column; a rate is shown with its interval.
+        words: number of leading columns that hold words; the others hold numbers.
+        title: "", or the title of a table that is collapsed because of its length.
     """
 
     head: list[str]
@@ -74,10 +75,10 @@ class Picture:
     """A figure.
 
     Attributes:
-        file: its PNG relative to the report; a PDF lies beside it.
-        image: the same, to be shown in a page.
-        text: what it shows.
-        kind: of the image, as MIME calls it.
+        file: its PNG, relative to the report; a PDF lies beside it.
+        image: the figure as bytes, for embedding in a page.
+        text: description of the figure.
+        kind: image subtype by MIME, like "svg+xml".
     """
 
     file: str
@@ -88,23 +89,24 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """Figures that belong together, with one caption."""
+    """Figures with a common caption."""
 
     pictures: list[Picture]
     caption: str
 
 
 Block = Heading | Paragraph | Bullets | Code | Table | Pictures
+"""Part of a report."""
 
 
 @dataclass(slots=True)
 class Document:
-    """A report."""
+    """A report: title and blocks."""
 
     title: str
     blocks: list[Block] = field(default_factory=list)
 
 
 def rate_words(rate: Rate) -> str:
-    """Share and interval; a dash without episodes."""
+    """Return share and interval of a rate in words; a dash without episodes."""
     return f"{rate.share:.2f} [{rate.low:.2f}, {rate.high:.2f}]" if rate.episodes else "–"

@@ -1,7 +1,8 @@
-"""A document as one HTML file that needs nothing besides itself: no server, no script, no request.
+"""Documents as one self-contained HTML file: no server, no script, no request.
 
-It is built as a tree, never as text: whatever a name or an error holds becomes text in it, by the standard library's
-serializer. A policy in the page forbids scripts and requests besides. Pictures are images, in which nothing can run.
+The page is built as a tree, never as text: the standard library's serializer turns untrusted names and errors into
+plain text. In addition, a content security policy in the page forbids scripts and requests. Pictures are images, in
+which nothing can run.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from .document import Block, Bullets, Code, Document, Entry, Heading, Link, Para
 from .untrusted_text import plain
 
 LONGEST = 2000
-"""Characters of a paragraph or a line of code."""
+"""Largest number of characters of a paragraph or a line of code."""
 SHORT = 28
-"""Characters of an entry of a table that is not broken into lines."""
+"""Largest number of characters of a table entry that is not broken into lines."""
 MANY = 9
-"""Columns from which on a table is set narrowly: names and entries are broken into lines."""
+"""Number of columns above which a table is set narrowly: names and entries are broken into lines."""
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 STYLE = """
 :root { color-scheme: light; }
@@ -62,7 +63,7 @@ a { color: #0060a8; }
 
 
 def html_of(document: Document) -> str:
-    """The whole file."""
+    """Return the HTML file of a document."""
     page = Element("html", lang="en")
     head = SubElement(page, "head")
     SubElement(head, "meta", charset="utf-8")
@@ -126,7 +127,7 @@ def _fill(cell: Element, entry: Entry) -> None:
         share, _, interval = rate_words(entry).partition(" ")
         cell.text = share
         if entry.episodes:
-            # the space keeps them apart for whoever copies the text
+            # the space separates share and interval in copied text
             cell.text += " "
             SubElement(cell, "small").text = interval
             low, high = 100.0 * entry.low, 100.0 * entry.high

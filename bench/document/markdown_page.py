@@ -1,4 +1,4 @@
-"""A document as Markdown."""
+"""Documents as Markdown."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from .document import Block, Bullets, Code, Document, Entry, Heading, Link, Para
 from .untrusted_text import markdown_text, plain
 
 LONGEST = 2000
-"""Characters of a paragraph or a line of code."""
+"""Largest number of characters of a paragraph or a line of code."""
 
 
 def markdown_of(document: Document) -> str:
-    """The whole text."""
+    """Return the Markdown text of a document."""
     parts = [f"# {markdown_text(document.title)}", *(_block(block) for block in document.blocks)]
     return "\n\n".join(part for part in parts if part) + "\n"
 

@@ -1,1 +1,1 @@
-"""What all figures share: style and solids."""
+"""Common parts of all figures: style, convex solids, surfaces."""

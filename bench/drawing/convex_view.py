@@ -1,6 +1,6 @@
-"""Convex solids seen from afar: what is in front of what, outlines, and the direction that shows most.
+"""Orthographic views of convex solids: occlusion, painting order, outlines, and choice of the best view.
 
-The projection is orthographic, so that lengths can be compared and every outline is a convex polygon.
+The projection is orthographic so that lengths are comparable and every outline is a convex polygon.
 """
 
 from __future__ import annotations
@@ -12,16 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...planner import Box, Capsule, Cylinder, Mesh, Pose, Shape, Sphere
 from ...planner.geometry.hulls import corner_points
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 
 CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 49)[:-1]), np.sin(np.linspace(0, 2 * np.pi, 49)[:-1])], axis=1)
+"""(48, 2) points of the unit circle."""
 RIM = 48
+"""Corners of a cylinder's rim."""
 AZIMUTHS, ELEVATIONS = tuple(90 * k + a for k in range(-2, 2) for a in (25, 35, 45, 55, 65)), (18, 26, 36)
-"""Directions that are tried [degrees]: none along an axis, where space looks flat."""
+"""Candidate directions [degrees]: none along an axis, where space looks flat."""
 CELLS = 420
-"""Of the grid on which areas are joined, along the longer side."""
+"""Number of cells, along the longer side, of the grid on which areas are united."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,8 @@ class DrawingView:
     """An orthographic view.
 
     Attributes:
-        azimuth: of the viewer about z [degrees].
-        elevation: of the viewer [degrees].
+        azimuth: azimuth of the viewer about z [degrees].
+        elevation: elevation of the viewer [degrees].
     """
 
     azimuth: float
@@ -38,23 +39,23 @@ class DrawingView:
 
     @property
     def axes(self) -> np.ndarray:
-        """(3, 3) rows: right, up, and towards the viewer."""
+        """(3, 3) unit vectors as rows: right, up, and towards the viewer."""
         a, e = math.radians(self.azimuth), math.radians(self.elevation)
         right = [-math.sin(a), math.cos(a), 0.0]
         up = [-math.sin(e) * math.cos(a), -math.sin(e) * math.sin(a), math.cos(e)]
         return np.array([right, up, np.cross(right, up)])
 
     def flat(self, points: np.ndarray) -> np.ndarray:
-        """(..., 2) [m] of points (..., 3)."""
+        """Return the image coordinates (..., 2) of points (..., 3) [m]."""
         return np.asarray(points) @ self.axes[:2].T
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """(...) how near points (..., 3) are to the viewer [m]."""
+        """Return the coordinates (...) of points (..., 3) towards the viewer [m]; larger is nearer."""
         return np.asarray(points) @ self.axes[2]
 
 
 class Facet(NamedTuple):
-    """A flat piece of a surface: corners (k, 3), in order, and the unit normal (3,) outwards."""
+    """A flat face of a surface: corners (k, 3) in order [m], and the outward unit normal (3,)."""
 
     corners: np.ndarray
     normal: np.ndarray
@@ -62,13 +63,13 @@ class Facet(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ConvexSolid:
-    """A convex solid: all points within `radius` of the hull of `core`.
+    """A convex solid: all points within `radius` of the convex hull of `core`.
 
     Attributes:
-        core: (n, 3) [m].
-        radius: [m]; 0 for what has flat faces.
+        core: (n, 3) corners of the core [m].
+        radius: rounding radius [m]; 0 for solids with flat faces.
         planes: (m, 4) outward normals and offsets of a solid without radius, else (0, 4).
-        facets: its flat faces; a cylinder's two ends.
+        facets: its flat faces; for a cylinder, its two ends.
         kind: sphere, capsule, box, cylinder or mesh.
     """
 
@@ -80,21 +81,34 @@ class ConvexSolid:
 
     @property
     def middle(self) -> np.ndarray:
-        """(3,) [m]."""
+        """(3,) mean of the core's corners [m]."""
         return self.core.mean(axis=0)
 
     def lowest(self, direction: np.ndarray) -> float:
-        """Smallest coordinate along a direction (3,) [m]."""
+        """Return the smallest coordinate along a direction (3,), scaled by its length [m]."""
         return float((self.core @ direction).min()) - self.radius * float(np.linalg.norm(direction))
 
     def outline(self, view: DrawingView, wider: float = 0.0) -> np.ndarray:
-        """(k, 2) convex polygon: the solid, blown up by so much [m], as it is seen."""
+        """Return the solid's outline as a convex polygon (k, 2) [m].
+
+        Args:
+            view: the view.
+            wider: distance by which the solid is inflated [m].
+        """
         flat = view.flat(self.core)
         grown = self.radius + wider
         return hull(flat if grown == 0.0 else (flat[:, None] + grown * CIRCLE).reshape(-1, 2))
 
     def hides(self, points: np.ndarray, view: DrawingView) -> np.ndarray:
-        """(n,) whether it is between points (n, 3), or round them, and the viewer."""
+        """Return whether the solid hides points from the viewer; it also hides the points inside it.
+
+        Args:
+            points: (n, 3) points [m].
+            view: the view.
+
+        Returns:
+            (n,) True for hidden points.
+        """
         if len(self.planes):
             ahead, outside = self.planes[:, :3] @ view.axes[2], points @ self.planes[:, :3].T + self.planes[:, 3]
             margins = -outside / np.where(np.abs(ahead) < 1e-9, np.nan, ahead)
@@ -112,7 +126,12 @@ class ConvexSolid:
 
 
 def solid_of(shape: Shape, pose: Pose) -> ConvexSolid:
-    """A shape of the planner, in the world."""
+    """Return a shape of the planner as a solid in the world.
+
+    Args:
+        shape: the shape.
+        pose: its pose in the world.
+    """
     turn, at = pose.rotation, pose.position
     if isinstance(shape, Sphere):
         return ConvexSolid(at[None], shape.radius, np.zeros((0, 4)), (), "sphere")
@@ -133,12 +152,18 @@ def solid_of(shape: Shape, pose: Pose) -> ConvexSolid:
 
 
 def ball_along(a: np.ndarray, b: np.ndarray, radius: float) -> ConvexSolid:
-    """A capsule from a (3,) to b (3,) [m]."""
+    """Return a capsule as a solid.
+
+    Args:
+        a: (3,) one end of its core [m].
+        b: (3,) other end of its core [m].
+        radius: its radius [m].
+    """
     return ConvexSolid(np.stack([a, b]), radius, np.zeros((0, 4)), (), "capsule")
 
 
 def hull(points: np.ndarray) -> np.ndarray:
-    """Corners (k, 2) of the hull of points (n, 2), counterclockwise; the points themselves where it has no area."""
+    """Return the convex hull (k, 2) of points (n, 2), counterclockwise; all points if the hull has no area."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -148,7 +173,7 @@ def hull(points: np.ndarray) -> np.ndarray:
 
 
 def union(outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Borders (k, 2) of the area that counterclockwise convex polygons (n, 2) cover together."""
+    """Return the borders (k, 2) of the union of counterclockwise convex polygons (n, 2) [m]."""
     from contourpy import contour_generator
 
     low, high = (f([f(outline, axis=0) for outline in outlines], axis=0) for f in (np.min, np.max))
@@ -172,7 +197,16 @@ def union(outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 def hidden_by(solids: Sequence[ConvexSolid], points: np.ndarray, view: DrawingView) -> np.ndarray:
-    """(n,) whether any solid hides points (n, 3)."""
+    """Return which points any solid hides from the viewer.
+
+    Args:
+        solids: the solids.
+        points: (n, 3) points [m].
+        view: the view.
+
+    Returns:
+        (n,) True for hidden points.
+    """
     out = np.zeros(len(points), dtype=bool)
     for solid in solids:
         out |= solid.hides(points, view)
@@ -180,7 +214,15 @@ def hidden_by(solids: Sequence[ConvexSolid], points: np.ndarray, view: DrawingVi
 
 
 def back_to_front(solids: Sequence[ConvexSolid], view: DrawingView) -> list[int]:
-    """Indices in an order in which they can be painted."""
+    """Return a painting order of solids.
+
+    Args:
+        solids: the solids.
+        view: the view.
+
+    Returns:
+        Indices of the solids, from back to front.
+    """
     count = len(solids)
     behind = np.zeros((count, count), dtype=bool)  # [i, j]: i must be painted before j
     for i in range(count):
@@ -199,13 +241,13 @@ def back_to_front(solids: Sequence[ConvexSolid], view: DrawingView) -> list[int]
 def best_view(
     shown: np.ndarray, aside: np.ndarray, solids: Sequence[ConvexSolid], ghosts: Sequence[ConvexSolid]
 ) -> DrawingView:
-    """The direction from which a path is seen best: in the open, and apart from another one.
+    """Return the direction with the best view of a path: unobstructed, and apart from another path.
 
     Args:
-        shown: (n, 3) the path that matters.
-        aside: (m, 3) the path that it leaves.
-        solids: what may hide it.
-        ghosts: what may hide it at less cost.
+        shown: (n, 3) the path of interest [m].
+        aside: (m, 3) the path it departs from [m].
+        solids: solids that may hide it.
+        ghosts: solids, like the arm, that may hide the path and the centers of the other solids.
     """
     things = np.vstack([shown, *[solid.middle[None] for solid in solids]])
     best, most = DrawingView(-60.0, 25.0), -math.inf
@@ -224,7 +266,7 @@ def best_view(
 
 
 def _in_front(a: ConvexSolid, b: ConvexSolid, view: DrawingView) -> int:
-    """1 if a is in front of b, -1 behind it, 0 if neither matters."""
+    """Return 1 if a is in front of b, -1 if it is behind, 0 if the order is irrelevant."""
     towards = view.axes[2]
     for first, second, sign in ((b, a, 1), (a, b, -1)):
         for *normal, offset in first.planes:
@@ -245,7 +287,7 @@ def _planes(points: np.ndarray) -> np.ndarray:
 
 
 def _facets(points: np.ndarray) -> tuple[Facet, ...]:
-    """The faces of a hull, coplanar triangles joined."""
+    """Return the faces of a convex hull, with coplanar triangles joined."""
     from scipy.spatial import ConvexHull
 
     equations = ConvexHull(points).equations

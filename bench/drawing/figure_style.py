@@ -1,4 +1,4 @@
-"""How figures look: as wide as a column of a paper, in colors that all eyes tell apart; the same bytes each time."""
+"""Style of figures: one column of a paper wide, in color-blind safe colors, with reproducible bytes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COLUMN = 3.5
 LEGEND_ROW = 0.155
 """Height of a row of a legend [inch]."""
 DOTS = 300
-"""Per inch of the pixel images."""
+"""Resolution of the PNG images [dots per inch]."""
 INK, FAINT, GRID = "#222222", "#767676", "#e4e4e4"
 STYLE: dict[Any, Any] = {
     "font.size": 8.0,
@@ -50,11 +50,12 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,
     "figure.dpi": 100.0,
 }
+"""Settings of matplotlib for all figures."""
 
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in this style; nothing of it stays."""
+    """Draw in this style inside the `with` block; the previous style returns afterwards."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE):
@@ -62,12 +63,15 @@ def styled() -> Iterator[None]:
 
 
 def new_figure(height: float, entries: int, columns: int) -> tuple[Any, Any]:
-    """A figure of one column's width with one axes.
+    """Return a figure of one column's width with one axes.
 
     Args:
-        height: without the legend [inch].
-        entries: of the legend.
-        columns: of the legend.
+        height: height without the legend [inch].
+        entries: number of entries of the legend.
+        columns: number of columns of the legend.
+
+    Returns:
+        Figure and axes.
     """
     from matplotlib.figure import Figure
 
@@ -76,16 +80,28 @@ def new_figure(height: float, entries: int, columns: int) -> tuple[Any, Any]:
 
 
 def legend_above(figure: Any, handles: list[Any], labels: list[str], columns: int) -> None:
-    """A legend over the whole width above the axes."""
+    """Draw a legend over the figure's whole width above the axes, unless there are no entries.
+
+    Args:
+        figure: the figure.
+        handles: handles of the entries.
+        labels: labels of the entries.
+        columns: largest number of columns.
+    """
     if handles:
         figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(handles)))
 
 
 def saved(figure: Any, stem: Path) -> str:
-    """Write .png and .pdf, without a date; the same picture as SVG."""
+    """Write a figure as .png and .pdf, without dates, and return it as SVG text.
+
+    Args:
+        figure: the figure.
+        stem: path of the files without suffix.
+    """
     stem.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(stem.with_suffix(".png"), dpi=DOTS, metadata={"Software": None})
-    figure.set_layout_engine("none")  # laid out once is laid out for all
+    figure.set_layout_engine("none")  # the layout of the first format holds for all formats
     figure.savefig(stem.with_suffix(".pdf"), metadata={"CreationDate": None, "Producer": None, "Creator": None})
     drawing = io.StringIO()
     figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})

@@ -1,4 +1,4 @@
-"""Painting convex solids, their shells and the floor below them as flat polygons: small, sharp vector graphics."""
+"""Painting of convex solids, their shells and the floor as flat polygons: small, sharp vector graphics."""
 
 from __future__ import annotations
 
@@ -15,12 +15,20 @@ ARM_FACES, ARM_EDGE = ("#ececec", "#cfd8e3"), "#8b9299"
 ARM_LINES: tuple[Any, Any] = ((0, (1.5, 1.5)), "solid")
 FLOOR, GRID, INK = "#f6f4ef", "#dcd8cf", "0.35"
 LIGHT = np.array([0.35, -0.45, 0.82])
+"""Direction towards the light."""
 SHINE = 9
-"""Nested lighter outlines that make a ball look round."""
+"""Number of nested lighter outlines that make a ball look round."""
 
 
 def paint_solid(axes: Any, view: DrawingView, solid: ConvexSolid, zorder: float) -> None:
-    """An obstacle."""
+    """Paint an obstacle.
+
+    Args:
+        axes: matplotlib axes.
+        view: the view.
+        solid: the obstacle.
+        zorder: layer of its lowest part; the other parts lie within 0.005 above.
+    """
     from matplotlib.patches import Polygon
 
     outline = solid.outline(view)
@@ -41,7 +49,7 @@ def paint_solid(axes: Any, view: DrawingView, solid: ConvexSolid, zorder: float)
 
 
 def _shine(axes: Any, view: DrawingView, solid: ConvexSolid, zorder: float) -> None:
-    """A soft light spot, as nested outlines of thinner and thinner balls that move towards the light."""
+    """Paint a soft light spot: nested outlines of shrinking solids that move towards the light."""
     from matplotlib.patches import Polygon
 
     light = view.flat(LIGHT)
@@ -53,21 +61,40 @@ def _shine(axes: Any, view: DrawingView, solid: ConvexSolid, zorder: float) -> N
 
 
 def paint_shells(axes: Any, view: DrawingView, solids: Sequence[ConvexSolid], distance: float) -> None:
-    """What is closer to obstacles than the shell's distance [m], as one area."""
+    """Paint the region closer to obstacles than the shell's distance as one area.
+
+    Args:
+        axes: matplotlib axes.
+        view: the view.
+        solids: the obstacles.
+        distance: thickness of the shell [m].
+    """
     if solids:
         style = {"edgecolor": SHELL_EDGE, "linewidth": 0.9, "linestyle": (0, (4, 3))}
         _paint_union(axes, [s.outline(view, distance) for s in solids], SHELL_FACE, 0.35, 6.0, style)
 
 
 def paint_arm(axes: Any, view: DrawingView, capsules: Sequence[ConvexSolid], posture: int) -> None:
-    """The arm's capsules in one posture as a pale shadow behind everything."""
+    """Paint the arm's capsules in one posture as a pale shadow behind everything.
+
+    Args:
+        axes: matplotlib axes.
+        view: the view.
+        capsules: capsules of the arm in this posture.
+        posture: 0 for the start, 1 for the goal.
+    """
     style = {"edgecolor": ARM_EDGE, "linewidth": 0.8, "linestyle": ARM_LINES[posture]}
     outlines = [capsule.outline(view) for capsule in capsules]
     _paint_union(axes, outlines, ARM_FACES[posture], 0.55, 4.0 + 0.5 * posture, style)
 
 
 def arm_patch(posture: int, **options: Any) -> Any:
-    """What stands for the arm in a legend."""
+    """Return the legend handle of the arm.
+
+    Args:
+        posture: 0 for the start, 1 for the goal.
+        options: options of matplotlib's `Patch`.
+    """
     from matplotlib.patches import Patch
 
     return Patch(facecolor=ARM_FACES[posture], edgecolor=ARM_EDGE, linestyle=ARM_LINES[posture], **options)
@@ -85,7 +112,14 @@ def _paint_union(
 
 
 def paint_floor(axes: Any, view: DrawingView, low: np.ndarray, high: np.ndarray) -> None:
-    """A grid at the lower side of a box from low (3,) to high (3,) [m], its coordinates, and a scale of heights."""
+    """Paint a grid on the lower side of a box, its coordinates, and a scale of heights.
+
+    Args:
+        axes: matplotlib axes.
+        view: the view.
+        low: (3,) lower corner of the box [m].
+        high: (3,) upper corner of the box [m].
+    """
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Polygon
 
@@ -112,14 +146,25 @@ def paint_floor(axes: Any, view: DrawingView, low: np.ndarray, high: np.ndarray)
 
 
 def floor_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(4, 3) of the lower side of a box, in order round it."""
+    """Return the corners (4, 3) of the lower side of a box, in order around it [m].
+
+    Args:
+        low: (3,) lower corner of the box [m].
+        high: (3,) upper corner of the box [m].
+    """
     return np.array(
         [[x, y, low[2]] for x, y in ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))]
     )
 
 
 def scale_ends(view: DrawingView, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(2, 3) foot and head of the scale of heights: at the corner of the floor that is leftmost in the picture."""
+    """Return foot and head (2, 3) of the scale of heights: at the floor's leftmost corner in the picture.
+
+    Args:
+        view: the view.
+        low: (3,) lower corner of the box [m].
+        high: (3,) upper corner of the box [m].
+    """
     corners = floor_corners(low, high)
     foot = corners[int(view.flat(corners)[:, 0].argmin())]
     return np.array([foot, [foot[0], foot[1], high[2]]])

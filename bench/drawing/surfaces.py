@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...planner import Box, Capsule, Cylinder, Pose, Shape, Sphere
 from ...planner.geometry.hulls import corner_points
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 SIDES, RINGS = 24, 6
-"""Of what is round: pieces of a full turn, and of a quarter turn from rim to pole."""
+"""Resolution of round shapes: pieces of a full turn, and points of a quarter turn from rim to pole."""
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 
 
 def surface(shape: Shape, pose: Pose) -> list[np.ndarray]:
-    """Polygons (k, 3) that cover a shape in the world [m]."""
+    """Return the polygons (k, 3) of a shape's surface in the world [m].
+
+    Args:
+        shape: the shape.
+        pose: its pose in the world.
+    """
     return [piece @ pose.rotation.T + pose.position for piece in _pieces(shape)]
 
 
@@ -38,7 +42,7 @@ def _pieces(shape: Shape) -> list[np.ndarray]:
 
 
 def _turned(profile: np.ndarray) -> list[np.ndarray]:
-    """The quadrilaterals of a profile (n, 2), radius and height, turned about z."""
+    """Return the quadrilaterals of a profile (n, 2), radius and height [m], revolved about z."""
     angle = 2.0 * np.pi * np.arange(SIDES + 1) / SIDES
     around = np.column_stack([np.cos(angle), np.sin(angle)])
     rings = np.array([np.column_stack([radius * around, np.full(SIDES + 1, z)]) for radius, z in profile])

@@ -1,4 +1,4 @@
-"""One episode: an environment, a policy, a scenario, and the record of what happened."""
+"""One episode: play a scenario with an environment and a policy, and record the outcome."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...baselines.policy import Policy, PolicyReport
-from ...configs.grid import RunConfig
+from ...baselines import Policy, PolicyReport
+from ...configs import RunConfig
 from ..metrics.clearance import solids_of
 from ..metrics.demonstration_distance import demonstration_named
 from ..metrics.metrics import metrics_of
@@ -21,7 +21,8 @@ from .episode_records import EpisodeRecord
 from .scenarios import Scenario
 
 GRACE_SECONDS = 2.0
-"""Time that the simulator gets to judge after a policy has declared that it is done."""
+"""Simulated time [s] between a policy declaring itself done and the end of the episode, so that a success can
+settle."""
 COMMON = ("is_success", "success", "safe", "n_contacts", "min_obstacle_distance", "layouts_refused")
 """Numbers and flags in `info` that every task has."""
 Observer = Callable[[Any, Any], None]
@@ -30,15 +31,15 @@ Observer = Callable[[Any, Any], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """An episode that has come to its end and is yet to be judged.
+    """A finished episode before judging.
 
     Attributes:
-        trace: what was measured.
-        info: the environment's last.
-        report: the policy's last.
-        ticks: real time of the policy in each tick [s].
-        first: how many ticks there were until an action moved something; 0: none did.
-        begun: when it began [s], by `time.perf_counter`.
+        trace: measurements of every control tick.
+        info: the environment's last `info`.
+        report: the policy's last report.
+        ticks: real time of the policy per tick [s].
+        first: number of ticks until the first action that moves a joint; 0: no action did.
+        begun: start time by `time.perf_counter` [s].
     """
 
     trace: Trace
@@ -52,19 +53,30 @@ class Played:
 def run_episode(
     env: Any, policy: Policy, scenario: Scenario, config: RunConfig, observer: Observer | None = None
 ) -> tuple[EpisodeRecord, PolicyReport]:
-    """Run one scenario to its end; success is what the environment says at the end."""
+    """Run one scenario to its end; the environment judges success.
+
+    Args:
+        env: environment of the cell.
+        policy: acts in the environment.
+        scenario: start of the episode.
+        config: config of the cell.
+        observer: called at the start and after every step, see `Observer`; None: no calls.
+
+    Returns:
+        Record of the episode, and the policy's last report.
+    """
     played = play(env, policy, scenario, observer)
     return episode_record(env, played, scenario, config), played.report
 
 
 def play(env: Any, policy: Policy, scenario: Scenario, observer: Observer | None = None) -> Played:
-    """Let a policy act in a scenario until it is over; raises what the policy raises.
+    """Let a policy act in a scenario until it is over; exceptions of the policy pass through.
 
     Args:
-        env: the environment.
-        policy: who acts.
-        scenario: where it begins.
-        observer: see `Observer`.
+        env: environment of the cell.
+        policy: acts in the environment.
+        scenario: start of the episode.
+        observer: called at the start and after every step, see `Observer`; None: no calls.
     """
     begun, recorder = time.perf_counter(), TraceRecorder(env)
     observation, info = env.reset(seed=scenario.seed, options={"level": scenario.level})
@@ -88,7 +100,7 @@ def play(env: Any, policy: Policy, scenario: Scenario, observer: Observer | None
 
 
 def _watching(recorder: TraceRecorder, observer: Observer | None) -> Observer:
-    """Both, one after the other."""
+    """Return an observer that calls the recorder, then the observer if there is one."""
 
     def watch(env: Any, observation: Any) -> None:
         recorder(env, observation)
@@ -101,14 +113,14 @@ def _watching(recorder: TraceRecorder, observer: Observer | None) -> Observer:
 def episode_record(
     env: Any, played: Played, scenario: Scenario, config: RunConfig, trajectories: Path | None = None
 ) -> EpisodeRecord:
-    """The record of an episode.
+    """Return the record of a played episode.
 
     Args:
-        env: the environment that it was played in.
-        played: how it went.
-        scenario: where it began.
-        config: what the record says of the run.
-        trajectories: folder into which the trace is written, as CELL-INDEX.npz; None: it is not kept.
+        env: environment in which the episode was played.
+        played: the played episode.
+        scenario: its start.
+        config: config of its cell.
+        trajectories: folder for the trace, saved as CELL-INDEX.npz; None: the trace is not saved.
     """
     info, numbers, success = played.info, numbers_of(played.info), bool(played.info["success"])
     if trajectories is not None:
@@ -145,7 +157,16 @@ def episode_record(
 
 
 def failure(info: dict[str, Any], report: PolicyReport, seconds: float) -> tuple[str, str]:
-    """Why an episode failed, in the words of the taxonomy, and one line for the reader; "" for a success."""
+    """Return why an episode failed: a reason of the failure taxonomy and one line for the reader.
+
+    Args:
+        info: the environment's last `info`.
+        report: the policy's last report.
+        seconds: simulated duration of the episode [s].
+
+    Returns:
+        Reason and explanation, both "" for a success.
+    """
     if info["success"]:
         return "", ""
     if report.failure_reason:
@@ -161,7 +182,7 @@ def failure(info: dict[str, Any], report: PolicyReport, seconds: float) -> tuple
 
 
 def numbers_of(info: dict[str, Any]) -> dict[str, list[float]]:
-    """The task's own numbers: what is in `info` besides what every task has."""
+    """Return the task's own numbers: the numeric entries of `info` that are not in `COMMON`."""
     return {
         key: [float(entry) for entry in np.ravel(value)]
         for key, value in info.items()
@@ -174,6 +195,6 @@ def _said(values: list[float]) -> str:
 
 
 def _report(policy: Policy, state: Any) -> PolicyReport:
-    """What the policy says, if it says anything."""
+    """Return the policy's report, or an empty one if the policy does not report."""
     tell = getattr(policy, "report", None)
     return tell(state) if tell else PolicyReport()

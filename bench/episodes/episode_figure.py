@@ -1,4 +1,4 @@
-"""Figures, in the paper's colors: demonstrated path blue, final path magenta, the way round obstacles cyan."""
+"""Figure of one episode in the paper's colors: demonstrated path blue, final path magenta, detour cyan."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
+from ...planner import Pose
 from ..drawing.convex_view import hull
 from ..drawing.surfaces import surface
 from .first_episode import Showcase
@@ -17,13 +17,13 @@ DEMONSTRATED, FINAL, FREE, EXECUTED = "#1f4fd8", "#d81fb4", "#00a9c7", "#6b6b6b"
 START_FACE, GOAL_FACE, TABLE_FACE = "#c8955a", "#8fb4f0", "#f1ede4"
 OBSTACLE_FACE, FURNITURE_FACE = "#d9482b", "#a9a090"
 TALL = 0.8
-"""Height of what is drawn, as a share of its width, from which it is drawn smaller: else labels leave the figure."""
+"""Ratio of height to width of the scene from which it is drawn smaller: otherwise its labels leave the figure."""
 MOVED = 0.005
-"""Length of an obstacle's trace [m] from which it is drawn."""
+"""Extent [m] from which an obstacle's trace is drawn."""
 
 
 class _Group(NamedTuple):
-    """Solids that look alike: per solid its polygons (k, 3), the legend's entry, and how they are drawn."""
+    """Solids with one style: polygons (k, 3) per solid [m], legend entry, face color, opacity, drawn edges or not."""
 
     solids: list[list[np.ndarray]]
     label: str
@@ -33,7 +33,13 @@ class _Group(NamedTuple):
 
 
 def draw_episode(seen: Showcase, title: str, files: Sequence[Path]) -> None:
-    """Paths and objects of one episode, in space and from above, written to every file."""
+    """Draw paths and objects of one episode, in 3D and from above.
+
+    Args:
+        seen: the observed episode.
+        title: title of the figure.
+        files: image files to write, all with the same figure.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -53,12 +59,12 @@ def draw_episode(seen: Showcase, title: str, files: Sequence[Path]) -> None:
 
 
 def _columns(entries: int) -> int:
-    """Of a legend with so many entries: in one line if they fit, else in two as equal as can be."""
+    """Return the number of legend columns: one row for up to six entries, else two rows as equal as possible."""
     return entries if entries <= 6 else (entries + 1) // 2
 
 
 def _lines(seen: Showcase) -> list[tuple[np.ndarray, str, dict[str, Any]]]:
-    """Points (n, 3), legend entry ("" for a repeated one) and style of every line."""
+    """Return points (n, 3), legend entry ("" for a repeated entry) and style of every line."""
     styles = {
         "demonstrated": ("demonstration", {"color": DEMONSTRATED, "linewidth": 2.0, "zorder": 5}),
         "final": ("final paths", {"color": FINAL, "linewidth": 1.5, "zorder": 4}),
@@ -77,7 +83,7 @@ def _lines(seen: Showcase) -> list[tuple[np.ndarray, str, dict[str, Any]]]:
 
 
 def _groups(seen: Showcase) -> list[_Group]:
-    """The groups of solids that there are, the first behind the others."""
+    """Return the groups of solids that are not empty, from back to front."""
     shapes = [each.shape for each in seen.objects]
     goals = [surface(shapes[k], Pose.from_vector(pose)) for k, pose in enumerate(seen.goals)]
     start = [surface(shapes[k], Pose.from_vector(pose)) for k, pose in enumerate(seen.start)]
@@ -106,7 +112,7 @@ def _draw_in_space(axes: Any, seen: Showcase) -> None:
     for group in _groups(seen):
         polygons = [polygon for solid in group.solids for polygon in solid]
         edge = {"edgecolor": "0.25", "linewidth": 0.4} if group.edges else {"edgecolor": "none"}
-        if max(len(solid) for solid in group.solids) > 6:  # round: an edge at every facet would blacken it
+        if max(len(solid) for solid in group.solids) > 6:  # curved: an edge at every facet would blacken it
             edge = {"edgecolor": "none"}
         style = {"facecolor": group.face, "alpha": group.alpha, "zorder": 2, **edge}
         axes.add_collection3d(Poly3DCollection(polygons, label=group.label, **style))
@@ -143,7 +149,7 @@ def _draw_from_above(axes: Any, seen: Showcase) -> None:
 
 
 def _bounds(seen: Showcase) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (3,) of what is drawn, down to the table [m]."""
+    """Return the lower and upper corner (3,) of the scene, down to the table [m]."""
     paths = [path.poses.positions for path in seen.paths]
     traces = [np.array(trace) for trace in seen.traces.values()]
     points = np.vstack([seen.executed, seen.start[:, :3], seen.goals[:, :3], *paths, *traces])

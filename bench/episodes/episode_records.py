@@ -1,4 +1,4 @@
-"""Episode records as lines of a file that survives crashes: append, check sum, flush, fsync."""
+"""Episode records as lines of a crash-safe file: append, checksum, flush, fsync."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ..workers.dispatcher import HUNG, WORKER_DIED
 
 FILE = "episodes.jsonl"
 FORMAT = 1
-"""Of the lines of a file; a line of another one is foreign."""
+"""Format version of a line; lines of other versions are not read."""
 TIMINGS = ("wall_seconds", "tick_us")
-"""What is not part of the result: it differs from run to run."""
+"""Fields that are not part of the result because they differ from run to run."""
 
 
 class RunBusy(OneDemoError):
@@ -35,29 +35,29 @@ class EpisodeRecord:
     """One finished episode.
 
     Attributes:
-        index: of the scenario.
-        seed: of the scenario.
-        method: the policy.
-        task: the task.
-        robot: the robot.
-        level: the level.
-        success: judged by the simulator at the end.
-        safe: no unwanted contact at any time.
-        stage: the furthest progress.
+        index: index of the scenario.
+        seed: seed of the scenario.
+        method: name of the policy.
+        task: name of the task.
+        robot: name of the robot.
+        level: level of difficulty.
+        success: verdict of the simulator at the end.
+        safe: True if there was no unwanted contact at any time.
+        stage: furthest progress.
         failure_reason: "" or one of the task's FAILURES.
-        detail: one line for the reader.
-        collision: the last unwanted contact, "" if there was none.
-        seconds: simulated.
-        contacts: control steps in which the robot or an object touched an obstacle.
-        clearance: smallest distance of the robot, or of what it held, to an obstacle [m]; None: there was none.
-        refused: starts that were drawn and had no room for the obstacles.
-        numbers: the task's own, as in `info`, each a list.
-        wall_seconds: real time; not part of the result.
-        tick_us: median, 99th percentile and largest time of the policy per tick, and its time until the first action
-            that moves something [us]; not part of the result. Zeros where the episode was lost with its worker.
+        detail: explanation in one line.
+        collision: the last unwanted contact; "" if there was none.
+        seconds: simulated duration [s].
+        contacts: number of control steps in which the robot or an object touched an obstacle.
+        clearance: smallest distance of the robot or the held object to an obstacle [m]; None without obstacles.
+        refused: number of drawn starts that left no space for the obstacles and were drawn again.
+        numbers: the task's own numbers, as in `info`, each as a list.
+        wall_seconds: real time [s]; not part of the result.
+        tick_us: median, 99th percentile and maximum of the policy's time per tick, and its total time until the first
+            action that moves a joint [us]; not part of the result. Zeros if the episode was lost with its worker.
         cell: digest of the cell's config.
         scenario: fingerprint of the scenario.
-        metrics: see `metric_table`; None where there was nothing to measure.
+        metrics: values by name, see `metric_table`; None if there was nothing to measure.
     """
 
     index: int
@@ -85,25 +85,25 @@ class EpisodeRecord:
 
     @property
     def key(self) -> tuple[str, int]:
-        """What an episode is known by in a run: its cell and its scenario's index."""
+        """Identity of the episode in its run: digest of the cell and index of the scenario."""
         return self.cell, self.index
 
     @property
     def lost(self) -> bool:
-        """Whether nobody knows how the episode would have ended, because its worker died or hung."""
+        """True if the outcome is unknown because the worker died or hung."""
         return self.failure_reason in (WORKER_DIED, HUNG) and self.seconds == 0.0
 
     @property
     def safe_success(self) -> bool:
-        """Success without any unwanted contact."""
+        """True for a success without any unwanted contact."""
         return self.success and self.safe
 
 
 def known_record(values: dict[str, Any]) -> EpisodeRecord:
-    """The record of a mapping; keys that came later than the mapping have their default.
+    """Return the record of a mapping; fields added after the mapping was written get their defaults.
 
     Raises:
-        ValueError: a key that no record has, or one that every record has is missing.
+        ValueError: a key is unknown, or a key without default is missing.
     """
     names = {each.name for each in fields(EpisodeRecord)}
     needed = {each.name for each in fields(EpisodeRecord) if each.default is each.default_factory is MISSING}
@@ -113,16 +113,20 @@ def known_record(values: dict[str, Any]) -> EpisodeRecord:
 
 
 def result_of(record: EpisodeRecord) -> dict[str, Any]:
-    """The record without what differs from run to run."""
+    """Return the fields of a record that do not differ from run to run."""
     return {key: value for key, value in asdict(record).items() if key not in TIMINGS}
 
 
 @contextmanager
 def locked(folder: Path, part: str = "") -> Iterator[None]:
-    """Hold the run folder for one process, or for one per part of it.
+    """Lock the run folder for this process, exclusively or for one part of the run.
+
+    Args:
+        folder: run folder.
+        part: name of the part; processes with different parts may hold the folder together; "": the whole folder.
 
     Raises:
-        RunBusy: another process holds it.
+        RunBusy: another process holds the folder or the part.
     """
     with (folder / ".lock").open("w") as whole:
         _hold(whole, folder, shared=bool(part))
@@ -142,13 +146,13 @@ def _hold(file: IO[str], folder: Path, *, shared: bool) -> None:
 
 
 def encoded(record: EpisodeRecord) -> bytes:
-    """One line: the record with a check sum."""
+    """Return the line of a record, with checksum."""
     body = json.dumps(asdict(record), sort_keys=True, separators=(",", ":"))
     return f'{{"crc":{zlib.crc32(body.encode())},"format":{FORMAT},"record":{body}}}\n'.encode()
 
 
 def decoded(line: bytes) -> EpisodeRecord | None:
-    """The record of a line; None if the line is not one, or is damaged."""
+    """Return the record of a line; None if the line is foreign or damaged."""
     try:
         outer: Any = json.loads(line)
         body, crc = outer["record"], outer["crc"]
@@ -161,9 +165,9 @@ def decoded(line: bytes) -> EpisodeRecord | None:
 
 
 def read_lines(path: Path) -> list[tuple[int, EpisodeRecord | None]]:
-    """Number (from 1) of every complete line of a file, and its record; None for one that is none.
+    """Return the number (from 1) and the record of every complete line; None for a line without a valid record.
 
-    A last line without its end is what a crash leaves behind: it is none of them; see `torn_line`.
+    An incomplete last line, left by a crash, is omitted; see `torn_line`.
     """
     if not path.exists():
         return []
@@ -172,13 +176,13 @@ def read_lines(path: Path) -> list[tuple[int, EpisodeRecord | None]]:
 
 
 def read_records(path: Path) -> tuple[list[EpisodeRecord], list[int]]:
-    """All records of a file, and the numbers (from 1) of lines that are none."""
+    """Return all valid records of a file, and the numbers (from 1) of its invalid lines."""
     lines = read_lines(path)
     return [record for _, record in lines if record], [number for number, record in lines if record is None]
 
 
 def torn_line(path: Path) -> int:
-    """Number (from 1) of a last line that a crash tore; 0 if there is none."""
+    """Return the number (from 1) of a last line torn by a crash; 0 if there is none."""
     if not path.exists():
         return 0
     *lines, torn = path.read_bytes().split(b"\n")
@@ -186,7 +190,7 @@ def torn_line(path: Path) -> int:
 
 
 class RecordWriter:
-    """Appends records; a torn last line is cut off first, a failed write is taken back."""
+    """Writer that appends records: it first cuts off a torn last line, and undoes a failed write."""
 
     def __init__(self, path: Path):
         self._file = path.open("ab", buffering=0)
@@ -194,10 +198,10 @@ class RecordWriter:
         self._file.truncate(self._end)
 
     def append(self, record: EpisodeRecord) -> None:
-        """Write one line and wait until it is on the disk.
+        """Append one record and wait until it is on disk.
 
         Raises:
-            OSError: the disk is full; the file ends with the last complete record.
+            OSError: writing failed, for example on a full disk; the file ends with the last complete record.
         """
         line = encoded(record)
         try:

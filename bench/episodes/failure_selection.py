@@ -1,4 +1,4 @@
-"""Which failures are shown as videos, and where those are: the first of each kind of each method."""
+"""Selection and file names of failure videos: the first failure of each kind of each method."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .episode_records import EpisodeRecord
 
 FOLDER, FILMED = "videos", "videos.json"
 MOST = 12
-"""Videos per run, unless the caller says otherwise."""
+"""Default of the largest number of videos per run."""
 NAME = re.compile(r"([0-9a-f]{12})-([0-9]{1,7})-([0-9]{1,10})-([a-z0-9_-]{1,60})\.mp4")
 
 
@@ -22,10 +22,10 @@ class Video:
 
     Attributes:
         cell: digest of its cell.
-        index: of its scenario.
-        seed: of its scenario.
-        reason: why it failed.
-        file: path in the run folder.
+        index: index of its scenario.
+        seed: seed of its scenario.
+        reason: reason of the failure, as in the file name.
+        file: path relative to the run folder, or to a report.
     """
 
     cell: str
@@ -36,15 +36,15 @@ class Video:
 
 
 def chosen(records: Iterable[EpisodeRecord], most: int = MOST) -> list[EpisodeRecord]:
-    """The first failure of each kind of each method, in the order of the records; of many methods each gets its share.
+    """Return the first failure of each kind of each method, in turn over the methods so that each gets its share.
 
     Args:
-        records: of all cells.
-        most: how many at most.
+        records: episodes of all cells.
+        most: largest number of failures to return.
     """
     first: dict[tuple[str, str], EpisodeRecord] = {}
     for record in records:
-        # what killed its worker, or hung, would do so again
+        # an episode that killed or hung its worker would probably do so again
         if not record.success and not record.lost:
             first.setdefault((record.method, record.failure_reason), record)
     turns: dict[str, int] = {}
@@ -56,14 +56,19 @@ def chosen(records: Iterable[EpisodeRecord], most: int = MOST) -> list[EpisodeRe
 
 
 def video_of(record: EpisodeRecord) -> Video:
-    """Where the video of an episode is."""
+    """Return the video of an episode, with its file name, whether or not the file exists."""
     reason = slug(record.failure_reason)
     name = f"{record.cell}-{record.index}-{record.seed}-{reason}.mp4"
     return Video(record.cell, record.index, record.seed, reason, f"{FOLDER}/{name}")
 
 
 def videos_beside(folders: Iterable[Path], output: Path) -> list[Video]:
-    """The videos of run folders, as a report in another folder leads to them; of an episode's those of the first."""
+    """Return the videos of run folders with links relative to a report's folder.
+
+    Args:
+        folders: run folders; for an episode filmed in several folders, the first counts.
+        output: folder of the report.
+    """
     found: dict[tuple[str, int], Video] = {}
     for folder in folders:
         here = videos_in(folder)
@@ -74,7 +79,7 @@ def videos_beside(folders: Iterable[Path], output: Path) -> list[Video]:
 
 
 def videos_in(folder: Path) -> list[Video]:
-    """The videos that a run folder has; files of other names are none."""
+    """Return the videos in a run folder; files with other names are ignored."""
     found = []
     for path in sorted((folder / FOLDER).glob("*.mp4")):
         match = NAME.fullmatch(path.name)

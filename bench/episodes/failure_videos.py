@@ -1,4 +1,4 @@
-"""Videos of failures, recorded by running an episode once more; `videos` says of which."""
+"""Failure videos, recorded by running an episode once more; see `failure_selection` for the choice."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...baselines.policy import Policy
-from ...configs.grid import RunConfig
+from ...baselines import Policy
+from ...configs import RunConfig
 from .episode import run_episode
 from .episode_records import EpisodeRecord
 from .failure_selection import video_of
@@ -16,18 +16,21 @@ from .scenarios import Scenario
 
 
 class _NoPicture(Exception):
-    """What is not seen need not be run to its end."""
+    """Stops an episode whose pictures cannot be drawn."""
 
 
 def record_video(env: Any, policy: Policy, record: EpisodeRecord, config: RunConfig, folder: Path) -> str:
-    """Run an episode once more and write its video; "" or why there is none. A video that is there is kept.
+    """Run an episode once more and write its video, unless the video exists.
 
     Args:
-        env: the environment of the episode's cell, which can draw.
-        policy: its policy.
-        record: what came of the episode.
-        config: of its cell.
+        env: environment of the episode's cell, with rendering.
+        policy: policy of the cell.
+        record: record of the episode.
+        config: config of the cell.
         folder: the run folder.
+
+    Returns:
+        "" or the reason why there is no video.
     """
     path = folder / video_of(record).file
     if path.exists():

@@ -1,4 +1,4 @@
-"""The first episode once more, watched: what the figure and the video are made from."""
+"""Replay of the first episode for its figure and its video."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ...baselines.policy import LabeledPath, Policy
+from ...baselines import LabeledPath, Policy
 from ...baselines.programs.world_model import obstacles_in
-from ...configs.grid import RunConfig
-from ...envs.core.description import TaskObject
-from ...planner.errors import RenderingUnavailable
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Obstacle
+from ...configs import RunConfig
+from ...envs import TaskObject
+from ...envs.errors import RenderingUnavailable
+from ...planner import Obstacle, Pose
 from .episode import run_episode
 from .scenarios import Scenario
 
@@ -26,21 +25,21 @@ FRAMES_PER_SECOND = 25
 
 @dataclass
 class Showcase:
-    """What was seen of an episode.
+    """Observations of an episode for its figure and video.
 
     Attributes:
-        objects: what was moved.
-        table_height: [m].
+        objects: the movable objects.
+        table_height: height of the table top [m].
         start: (n, 7) object poses at the start.
-        goals: (n, 7) where they had to end.
+        goals: (n, 7) goal poses of the objects.
         end: (n, 7) object poses at the end.
-        executed: (steps + 1, 3) the tcp [m].
-        paths: what the policy planned.
-        furniture: what stands there.
-        obstacles: by name, the last that was seen of each.
-        traces: by name, (n, 3) where it was [m].
-        speed: how much faster than reality the video plays.
-        video_problem: "" or why there is no video.
+        executed: (steps + 1, 3) positions of the tcp [m].
+        paths: paths planned by the policy.
+        furniture: fixed bodies.
+        obstacles: by name, the last observation of each obstacle.
+        traces: by name, the observed positions (3,) of each obstacle [m].
+        speed: playback speed of the video relative to simulated time.
+        video_problem: "" or the reason why there is no video.
     """
 
     objects: tuple[TaskObject, ...]
@@ -58,7 +57,15 @@ class Showcase:
 
 
 def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video: Path | None) -> Showcase:
-    """Run a scenario and keep what was seen; write the video on the way, if one is wanted and can be drawn."""
+    """Run a scenario and return the observations; also write a video if wanted and possible.
+
+    Args:
+        env: environment of the cell.
+        policy: policy of the cell.
+        scenario: start of the episode.
+        config: config of the cell.
+        video: file of the video (.mp4); None: no video.
+    """
     task = env.unwrapped.task
     seen = Showcase(task.objects, task.table_height)
     tcp: list[np.ndarray] = []
@@ -86,9 +93,9 @@ def watch(env: Any, policy: Policy, scenario: Scenario, config: RunConfig, video
 
 
 class Film:
-    """An mp4 that is written picture by picture; it appears under its name only when all of it can be read again.
+    """An mp4 written picture by picture; it gets its final name only once all of it can be read back.
 
-    Used in a `with` statement: what is broken off leaves no file.
+    Used in a `with` statement: after an exception no file remains. `problem` is "" or the reason why there is no video.
     """
 
     def __init__(self, path: Path):
@@ -110,7 +117,7 @@ class Film:
         self._part.unlink(missing_ok=True)
 
     def take(self, env: Any) -> None:
-        """Add a picture, unless drawing or writing has turned out to be impossible."""
+        """Add a picture, unless rendering or writing has failed before."""
         if self.problem:
             return
         try:
@@ -120,7 +127,7 @@ class Film:
             return
         try:
             self._add(picture)
-        except OSError as error:  # its text is FFmpeg's whole output
+        except OSError as error:  # the error's text is FFmpeg's whole output
             self.problem = f"the video could not be written ({error.strerror or 'FFmpeg failed'}); is the disk full?"
 
     def _add(self, picture: Any) -> None:
@@ -141,7 +148,7 @@ class Film:
             self.problem = self.problem or f"the video could not be written ({error.strerror or 'FFmpeg failed'})"
 
     def _readable_pictures(self) -> int:
-        """How many pictures the file holds; FFmpeg does not say when it could not write its end."""
+        """Return the number of pictures in the file; FFmpeg does not report that it could not write the end."""
         from imageio_ffmpeg import count_frames_and_secs
 
         try:

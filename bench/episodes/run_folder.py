@@ -1,16 +1,16 @@
-"""What lies in a run folder, and who may write there.
+"""Files of a run folder, and locking of the folder.
 
-| file | what |
+| file | content |
 |---|---|
-| `config.yaml` | the config with the changes of the command line: `onedemo run` takes it |
+| `config.yaml` | the config with the changes of the command line: `onedemo run` accepts it |
 | `cells.json` | every cell: digest, label, whole config |
-| `environment.json` | on what it was run, and the command |
+| `environment.json` | versions, processor and command of the run |
 | `scenarios.json` | the frozen starts, see `scenarios.Suite` |
 | `episodes.jsonl` | a line for each finished episode, appended; of part i of n: `episodes.i-of-n.jsonl` |
-| `workers.log` | what worker processes said |
-| `trajectories/` | with `trajectories: true`: what was measured at every tick, CELL-INDEX.npz, see `trace.Trace` |
-| `showcase.json` | what became of figure and video of the first episode of a run of one cell |
-| `videos/`, `videos.json` | with `video: true`: failures, see `videos.chosen`; why there is none |
+| `workers.log` | output of the worker processes |
+| `trajectories/` | with `trajectories: true`: measurements of every tick, CELL-INDEX.npz, see `trace.Trace` |
+| `showcase.json` | outcome of figure and video of the first episode of a run of one cell |
+| `videos/`, `videos.json` | with `video: true`: failures, see `failure_selection.chosen`; reasons for missing videos |
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...configs.grid import Grid
-from ...configs.run_config import RunConfig
-from ...planner.errors import BadConfig
+from ...configs import BadConfig, Grid, RunConfig
 from ..atomic_files import sha256_of, write_whole
 from ..console import COMMAND_LINE
 from .episode_records import FILE, EpisodeRecord, RunBusy, encoded, locked, read_lines, result_of, torn_line
@@ -40,19 +38,19 @@ PARTS = "episodes.*-of-*.jsonl"
 
 
 class Shard(NamedTuple):
-    """A part of a run: every `count`-th episode, from the `index`-th on (from 1)."""
+    """A part of a run: every `count`-th episode, beginning with the `index`-th (from 1)."""
 
     index: int
     count: int
 
     @property
     def name(self) -> str:
-        """For files; "" for a whole run."""
+        """Name for files; "" for a whole run."""
         return "" if self.count == 1 else f"{self.index}-of-{self.count}"
 
     @property
     def file(self) -> str:
-        """Where its records go."""
+        """Name of the file of the part's records."""
         return f"episodes.{self.name}.jsonl" if self.name else FILE
 
 
@@ -60,10 +58,10 @@ WHOLE = Shard(1, 1)
 
 
 def parsed_shard(text: str | None) -> Shard:
-    """Part i of n as in "2/4"; None: the whole.
+    """Return part i of n from a text like "2/4"; the whole run from None.
 
     Raises:
-        BadConfig: it is not of that form, or there is no such part.
+        BadConfig: the text has another form, or there is no such part.
     """
     if text is None:
         return WHOLE
@@ -74,10 +72,15 @@ def parsed_shard(text: str | None) -> Shard:
 
 
 def open_folder(folder: Path, held: ExitStack, part: str = "") -> None:
-    """Make the run folder and hold it, or a part of it, for this process.
+    """Make the run folder and lock the folder, or a part of the run, for this process.
+
+    Args:
+        folder: run folder.
+        held: releases the lock when it closes.
+        part: name of the part; "": the whole folder.
 
     Raises:
-        BadConfig: nothing can be written there.
+        BadConfig: the folder cannot be written.
         RunBusy: another process writes there.
         OSError: the disk is full.
     """
@@ -92,14 +95,24 @@ def open_folder(folder: Path, held: ExitStack, part: str = "") -> None:
 
 @contextmanager
 def alone(folder: Path, what: str) -> Iterator[None]:
-    """Wait until no other part of the run does the same."""
+    """Run the `with` block while no other process runs a block of the same name in this folder; wait if necessary.
+
+    Args:
+        folder: run folder.
+        what: name of the block.
+    """
     with (folder / f".lock-{what}").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
 
 
 def describe(grid: Grid, folder: Path, command: str) -> None:
-    """Write what the run is; refuse a folder that holds another one.
+    """Write the description of a run; refuse a folder that holds another run.
+
+    Args:
+        grid: cells of the run.
+        folder: run folder.
+        command: command line that started the run.
 
     Raises:
         BadConfig: the folder belongs to another config.
@@ -126,10 +139,10 @@ def describe(grid: Grid, folder: Path, command: str) -> None:
 
 
 def read_cells(folder: Path) -> tuple[str, list[tuple[str, RunConfig]]]:
-    """The digest of a run, and label and config of its cells.
+    """Return the digest of a run, and label and config of each of its cells.
 
     Raises:
-        BadConfig: the file is none, or of another version.
+        BadConfig: the file is missing, unreadable, or of another version.
     """
     file = folder / CELLS
     try:
@@ -148,7 +161,16 @@ def read_cells(folder: Path) -> tuple[str, list[tuple[str, RunConfig]]]:
 def recorded(
     folder: Path, cells: Iterable[RunConfig], suite: Suite
 ) -> tuple[dict[tuple[str, int], EpisodeRecord], list[str]]:
-    """The episodes of a run that are finished, by cell and index; and lines about what was skipped."""
+    """Return the finished episodes of a run, and notes about skipped lines.
+
+    Args:
+        folder: run folder.
+        cells: cells of the run.
+        suite: scenarios of the run; records of other scenarios are skipped.
+
+    Returns:
+        Records by cell digest and scenario index, and one line of text per skipped or torn line.
+    """
     known = {
         (cell.digest(), each.index): suite.of(cell, each.index)["fingerprint"]
         for cell in cells
@@ -172,7 +194,12 @@ def recorded(
 def merge(folder: Path, records: Iterable[EpisodeRecord], cells: list[RunConfig]) -> None:
     """Write the records of all parts, if there are any, into one file, in the order of the cells.
 
-    The folder must be held: nobody may append to that file meanwhile.
+    The caller must hold the folder: no other process may append to that file meanwhile.
+
+    Args:
+        folder: run folder.
+        records: all records of the run.
+        cells: cells of the run.
     """
     if not any(folder.glob(PARTS)):
         return
@@ -183,7 +210,7 @@ def merge(folder: Path, records: Iterable[EpisodeRecord], cells: list[RunConfig]
 
 
 def gather(folder: Path) -> None:
-    """Put the parts of a run together as far as they are there, unless the run goes on in this very file."""
+    """Merge the existing parts of a run, unless another process is writing to the merged file."""
     _, labeled = read_cells(folder)
     cells, suite = [cell for _, cell in labeled], read_suite(folder)
     if suite is not None and any(folder.glob(PARTS)):
@@ -192,11 +219,16 @@ def gather(folder: Path) -> None:
 
 
 def table_hash(records: Iterable[EpisodeRecord]) -> str:
-    """sha256 over all results, whatever order they came in and however long they took."""
+    """Return the sha256 of all results, independent of their order and of timings."""
     return sha256_of([result_of(record) for record in sorted(records, key=lambda record: record.key)])
 
 
 def written_json(folder: Path, name: str) -> dict[str, Any]:
-    """A file of the run folder; empty if there is none."""
+    """Return the content of a JSON file of the run folder; empty if the file is missing.
+
+    Args:
+        folder: run folder.
+        name: file name.
+    """
     file = folder / name
     return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}

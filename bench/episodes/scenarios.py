@@ -1,4 +1,4 @@
-"""The frozen starts of a run: the same for every method, drawn once, with a hash."""
+"""The frozen starts of a run: drawn once, hashed, and equal for every method."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...configs.grid import RunConfig
-from ...planner.errors import BadConfig, OneDemoError
+from ...configs import BadConfig, RunConfig
+from ...planner.errors import OneDemoError
 from ..atomic_files import canonical, sha256_of, write_whole
 
 FILE = "scenarios.json"
 VERSION = 1
 PLACE = ("task", "robot", "level", "obstacles", "env", "seed")
-"""Keys of a cell that decide from what its scenarios are drawn."""
+"""Keys of a cell that determine its scenarios."""
 HOW = ("control_mode", "reward")
-"""Arguments of environments that say how one acts and is paid, not where one starts: with others, scenarios are the
-same, and methods that act in different ways are paired."""
+"""Arguments of environments that change actions or rewards but not the start: methods that differ only in them share
+their scenarios, and are paired."""
 
 
 class ScenarioChanged(OneDemoError):
@@ -38,8 +38,8 @@ class Scenario:
 
     Attributes:
         index: position in the list.
-        seed: given to `env.reset`.
-        level: given to `env.reset`.
+        seed: seed for `env.reset`.
+        level: level for `env.reset`.
     """
 
     index: int
@@ -48,17 +48,17 @@ class Scenario:
 
 
 def scenarios_of(config: RunConfig) -> list[Scenario]:
-    """The scenarios of a config."""
+    """Return the scenarios of a config."""
     return [Scenario(k, config.seed + k, config.level) for k in range(config.episodes)]
 
 
 def place_of(config: RunConfig) -> str:
-    """What the scenarios of a cell are drawn from; cells of the same place are paired."""
+    """Return the scenario key of a cell as JSON text: cells with equal keys share their scenarios and are paired."""
     return canonical(_place({key: getattr(config, key) for key in PLACE}))
 
 
 def lists_of(cells: Iterable[RunConfig]) -> list[RunConfig]:
-    """For each place a cell with the most episodes, in the order of the places' texts."""
+    """Return the cell with the most episodes for each scenario key, sorted by key."""
     longest: dict[str, RunConfig] = {}
     for cell in cells:
         place = place_of(cell)
@@ -68,12 +68,12 @@ def lists_of(cells: Iterable[RunConfig]) -> list[RunConfig]:
 
 
 def frozen(config: RunConfig, index: int, drawn: Mapping[str, Any]) -> dict[str, Any]:
-    """A scenario as it stands in the file.
+    """Return a scenario as written in the file, with its fingerprint.
 
     Args:
-        config: a cell of its place.
+        config: a cell with the scenario's key.
         index: position in the list.
-        drawn: the start as `starts.drawn_start` describes it, or why there is none under "infeasible".
+        drawn: the start, see `start_states.drawn_start`; or the reason why there is none, under "infeasible".
     """
     place = {**json.loads(place_of(config)), "seed": config.seed + index, "index": index, **drawn}
     return {**place, "fingerprint": sha256_of(place)[:12]}
@@ -83,7 +83,7 @@ class Suite:
     """All scenarios of a run.
 
     Attributes:
-        scenarios: as in the file.
+        scenarios: scenarios as in the file.
         hash: sha256 of their canonical JSON.
     """
 
@@ -93,16 +93,21 @@ class Suite:
         self._at = {_key(each, each["seed"] - each["index"], each["index"]): each for each in self.scenarios}
 
     def of(self, config: RunConfig, index: int) -> Mapping[str, Any]:
-        """The scenario of a cell with an index."""
+        """Return the scenario of a cell by index.
+
+        Args:
+            config: the cell.
+            index: position in the cell's list.
+        """
         values = {key: getattr(config, key) for key in PLACE}
         return self._at[_key(values, config.seed, index)]
 
     def feasible(self, config: RunConfig) -> list[Scenario]:
-        """The scenarios of a cell that can be run."""
+        """Return the scenarios of a cell that can be run."""
         return [each for each in scenarios_of(config) if "infeasible" not in self.of(config, each.index)]
 
     def summary(self) -> str:
-        """How many, how many draws were refused, how many could not be drawn at all."""
+        """Return the numbers of scenarios, refused draws and infeasible scenarios in words."""
         refused = sum(each.get("refused", 0) for each in self.scenarios)
         infeasible = sum("infeasible" in each for each in self.scenarios)
         count = len(self.scenarios)
@@ -114,7 +119,7 @@ class Suite:
         return "; ".join(parts)
 
     def write(self, folder: Path) -> None:
-        """Write the file."""
+        """Write the scenarios into a run folder."""
         head = f'{{"version": {VERSION}, "suite": "{self.hash}", "scenarios": [\n'
         write_whole(folder / FILE, head + ",\n".join(canonical(each) for each in self.scenarios) + "\n]}\n")
 
@@ -129,10 +134,10 @@ def _place(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_suite(folder: Path) -> Suite | None:
-    """The scenarios of a run folder; None if they have not been drawn yet.
+    """Return the scenarios of a run folder; None if they have not been drawn yet.
 
     Raises:
-        BadConfig: the file is none, of another version, or has been changed.
+        BadConfig: the file is invalid, of another version, or was changed.
     """
     file = folder / FILE
     if not file.is_file():
@@ -152,10 +157,10 @@ def read_suite(folder: Path) -> Suite | None:
 
 
 def check_mergeable(suites: Mapping[Path, Suite]) -> None:
-    """Refuse to put runs side by side that were not run on the same scenarios.
+    """Refuse to compare runs of different scenarios.
 
     Raises:
-        BadConfig: the hashes differ; naming two of the folders.
+        BadConfig: the hashes differ; the error names two of the folders.
     """
     (first, kept), *others = suites.items()
     for folder, suite in others:

@@ -1,4 +1,4 @@
-"""The start that an environment has drawn, described and compared with a frozen one."""
+"""Drawn starts of an environment: description, and comparison with frozen starts."""
 
 from __future__ import annotations
 
@@ -8,21 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.simulation.moving_obstacles import ScheduledObstacle, described
+from ...envs import ScheduledObstacle
+from ...envs.simulation.moving_obstacles import described
 from .scenarios import Scenario, ScenarioChanged
 
 OBSERVED = ("joint_positions", "object_pose", "goal_pose", "furniture_pose")
-"""Entries of the observation that a start consists of, besides the obstacles; those that a task has."""
+"""Entries of the observation that describe a start, besides the obstacles; entries a task lacks are skipped."""
 DIGITS = 9
 TOLERANCE = 1e-7
-"""Starts that differ by less than this [m, rad] are the same: processors round differently."""
+"""Starts that differ by less than this [m, rad] count as equal: processors round differently."""
 
 
 def drawn_start(env: Any, observation: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Objects, goals, joints and obstacles of an environment that has just been reset, as JSON can hold them.
+    """Return objects, goals, joints and obstacles of an environment after reset, as JSON values.
 
-    Poses are x y z [m] and wxyz in the world, joints [rad]; obstacles as in
+    Poses are x y z [m] and wxyz in the world, joints in [rad]; obstacles as in
     `envs.simulation.moving_obstacles.ScheduledObstacle`.
+
+    Args:
+        env: environment that has just been reset.
+        observation: its observation.
     """
     start: dict[str, Any] = {key: _rounded(observation[key]) for key in OBSERVED if key in observation}
     start["obstacles"] = [obstacle(each) for each in env.unwrapped.sim.obstacles.scheduled_obstacles]
@@ -30,7 +35,7 @@ def drawn_start(env: Any, observation: Mapping[str, np.ndarray]) -> dict[str, An
 
 
 def obstacle(each: ScheduledObstacle) -> dict[str, Any]:
-    """Shape, size, place and motion of an obstacle."""
+    """Return shape, size, place and motion of an obstacle as JSON values."""
     numbers = {key: _rounded(getattr(each, key)) for key in ("center", "rotation", "long", "short")}
     scalars = {key: _rounded(getattr(each, key)) for key in ("frequency", "phase", "delay")}
     kind = type(each.shape).__name__.lower()
@@ -40,15 +45,20 @@ def obstacle(each: ScheduledObstacle) -> dict[str, Any]:
         **numbers,
         **scalars,
         "motion": each.motion,
-        "leg": each.leg,
+        "leg": each.blocked_motion,
     }
 
 
 def check_start(scenario: Scenario, frozen: Mapping[str, Any], start: Mapping[str, Any]) -> None:
     """Compare a drawn start with the frozen one.
 
+    Args:
+        scenario: the scenario, for the error.
+        frozen: the start in the file.
+        start: the start just drawn, see `drawn_start`.
+
     Raises:
-        ScenarioChanged: they differ; naming the first number that does.
+        ScenarioChanged: they differ; the error names the first differing number.
     """
     found = difference("start", frozen, start)
     if found:
@@ -56,7 +66,13 @@ def check_start(scenario: Scenario, frozen: Mapping[str, Any], start: Mapping[st
 
 
 def difference(where: str, frozen: Any, drawn: Any) -> str:
-    """The first place where two values of JSON differ, in words; "" if they do not."""
+    """Return the first difference between two JSON values in words; "" if there is none.
+
+    Args:
+        where: path of the values in the start, for the text.
+        frozen: value in the file.
+        drawn: value just drawn.
+    """
     if isinstance(frozen, Mapping) and isinstance(drawn, Mapping) and set(frozen) == set(drawn):
         pairs = [(f"{where}.{key}", frozen[key], drawn[key]) for key in frozen]
     elif isinstance(frozen, list) and isinstance(drawn, list) and len(frozen) == len(drawn):
@@ -80,5 +96,5 @@ def _short(value: Any) -> str:
 
 
 def _rounded(value: Any) -> Any:
-    # adding zero makes a negative zero a positive one
+    # adding zero turns a negative zero into a positive one
     return (np.round(np.asarray(value, dtype=np.float64), DIGITS) + 0.0).tolist()

@@ -1,4 +1,4 @@
-"""Run folders made of drawn numbers, for measuring and testing reports: nothing in them was ever run."""
+"""Run folders with random numbers, for measuring and testing reports: no episode in them was ever run."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...configs.run_config import RunConfig
-from ...envs.simulation.moving_obstacles import ScheduledObstacle
-from ...planner.geometry.shapes import Sphere
+from ...configs import RunConfig
+from ...envs import ScheduledObstacle
+from ...planner import Sphere
 from ..metrics.metric_table import METRICS
 from ..task_table import TASKS
 from .episode_records import FILE, EpisodeRecord, encoded
@@ -38,7 +38,16 @@ def write_synthetic_run(
     methods: tuple[str, ...] = METHODS,
     seed: int = 0,
 ) -> Path:
-    """A finished run folder with so many episodes per cell; the folder."""
+    """Write a finished run folder with random outcomes, and return the folder.
+
+    Args:
+        folder: folder to write; made if missing.
+        episodes: number of episodes per cell.
+        tasks: names of the tasks.
+        levels: levels of every task.
+        methods: methods on every task and level.
+        seed: random seed of the outcomes, and seed of the cells.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
     places = [_cell(task, level, methods[0], episodes, seed) for task in tasks for level in levels]

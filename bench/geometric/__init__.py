@@ -1,1 +1,1 @@
-"""`onedemo geometric`: paths without physics."""
+"""`onedemo geometric`: comparison of paths without physics."""

@@ -1,8 +1,8 @@
-"""Whether hand and held object touch an obstacle along a path, by python-fcl, at the poses and between them.
+"""Check of the hand and the held object against obstacles along a path, by python-fcl, at the poses and between them.
 
-Between two poses the path is taken for a screw, whoever made it. A point of a rigid body moves along it at a constant
-speed, which is largest at an end of a capsule's core: what is farther away at both poses than it can go in between does
-not touch; else the stretch is halved.
+Between two poses every path counts as a screw motion. Along it a point of a rigid body has constant speed, and the
+fastest points of a capsule's core are its ends. If the clearances at both poses together exceed the displacement, there
+is no contact in between; otherwise the stretch is halved.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...planner import Body, Obstacle, PosePath
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import PosePath
-from ...planner.geometry.shapes import Obstacle
 from ...planner.judge.geometry import CollisionWorld, Moment
-from ...planner.robot.body import Body
+from ...planner.robot.body import TOOL_CAPSULE
 
 FAR = 0.05
-"""Clearances above this [m] are not told apart."""
+"""Clearance [m] above which clearances are not distinguished."""
 SHORTEST = 2e-4
-"""Way [m] of a capsule's point between two poses below which an undecided stretch counts as touching."""
+"""Displacement [m] of a capsule's points between two poses below which an undecided stretch counts as contact."""
 HALVINGS = 24
+"""Largest number of halvings of a stretch."""
 
 
 class PathClearance(NamedTuple):
-    """What was found of a path.
+    """Verdict on a path.
 
     Attributes:
-        clear: nothing touches, between the poses either.
-        least: smallest distance at the poses that were looked at [m], at most FAR.
+        clear: True if there is no contact, neither at the poses nor between them.
+        least: smallest distance at the checked poses [m], at most `FAR`.
     """
 
     clear: bool
@@ -38,22 +38,22 @@ class PathClearance(NamedTuple):
 
 
 class ToolJudge:
-    """Judges paths of one tool among obstacles.
+    """Judge of the paths of one tool among static obstacles.
 
     Args:
         tool: (m, 7) capsules in the tcp's frame, see `Body.tool`.
-        obstacles: that stand still.
+        obstacles: static obstacles.
     """
 
     def __init__(self, tool: np.ndarray, obstacles: Sequence[Obstacle]):
         rows = np.column_stack([np.zeros(len(tool)), tool])
         self._scene = CollisionWorld(Body(rows, tuple(f"capsule{k}" for k in range(len(tool)))), obstacles)
-        self._ends, self._radii = tool[:, :6].reshape(-1, 2, 3), tool[:, 6]
+        self._ends, self._radii = tool[:, : TOOL_CAPSULE.radius].reshape(-1, 2, 3), tool[:, TOOL_CAPSULE.radius]
         self._turns = np.array([_turn_to(b - a) for a, b in self._ends])
         self._count = len(obstacles)
 
     def clearance_of(self, path: PosePath) -> PathClearance:
-        """The verdict on a path."""
+        """Return the verdict on a path."""
         if not self._count:
             return PathClearance(True, FAR)
         moment = self._moment(path.dqs)
@@ -68,7 +68,7 @@ class ToolJudge:
         first, last, before, after = poses[:-1], poses[1:], clearance[:-1], clearance[1:]
         for _ in range(HALVINGS):
             displacement = self._displacements(first, last)
-            # of what is beyond FAR only that is known: it is taken for FAR
+            # clearances above FAR are stored as FAR, which is a valid lower bound
             undecided = (before + after <= displacement[:, :, None]).any(axis=(1, 2))
             if not undecided.any():
                 return PathClearance(True, least)
@@ -85,7 +85,7 @@ class ToolJudge:
         return PathClearance(False, least)
 
     def _clearances(self, moment: Moment) -> np.ndarray:
-        """(n, m, k) distances [m], at most FAR."""
+        """Return the distances (n, m, k) [m], at most `FAR`."""
         out = np.minimum(self._scene.at_least(moment), FAR)
         near = np.argwhere(out < FAR)
         if len(near):
@@ -93,7 +93,7 @@ class ToolJudge:
         return out
 
     def _moment(self, poses: np.ndarray) -> Moment:
-        """Where the capsules are at poses (n, 8)."""
+        """Return the placed capsules at poses (n, 8)."""
         turn, place = _rotations(poses), dq.translation(poses)
         ends = np.einsum("nij,mej->nmei", turn, self._ends) + place[:, None, None]
         turns = turn[:, None] @ self._turns
@@ -101,7 +101,7 @@ class ToolJudge:
         return Moment(np.zeros(len(poses)), np.empty((len(poses), 0)), nothing, nothing, ends, turns, turn)
 
     def _displacements(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """(n, m) longest way [m] of a point of each capsule along the screws."""
+        """Return bounds (n, m) on the displacement [m] of the points of each capsule along the screws."""
         twist = dq.twist_from_dq(dq.mul(dq.conj(first), last))
         v, w = twist[:, None, None, :3], twist[:, None, None, 3:]
         speed = np.linalg.norm(v + np.cross(w, self._ends[None]), axis=-1).max(axis=-1)
@@ -109,7 +109,7 @@ class ToolJudge:
 
 
 def _rotations(poses: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) of dual quaternions (n, 8)."""
+    """Return the rotation matrices (n, 3, 3) of dual quaternions (n, 8)."""
     w, x, y, z = poses[:, :4].T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -120,7 +120,7 @@ def _rotations(poses: np.ndarray) -> np.ndarray:
 
 
 def _turn_to(direction: np.ndarray) -> np.ndarray:
-    """A rotation matrix whose z axis is along a vector; any, if that is zero."""
+    """Return a rotation matrix with its z axis along a vector; for a zero vector along z."""
     length = np.linalg.norm(direction)
     z = direction / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
     x = np.cross(z, np.eye(3)[int(np.abs(z).argmin())])

@@ -1,4 +1,4 @@
-"""`onedemo geometric`: scenarios drawn once, paths made by every path maker, numbers, tables and figures out."""
+"""`onedemo geometric`: draw scenarios once, run every path generator on them, and write numbers, tables and figures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...planner.errors import BadConfig, UnknownName
+from ...configs import BadConfig
+from ...planner.errors import UnknownName
 from ..atomic_files import canonical
 from ..console import console, labeled
 from ..episodes.run_folder import LOG, alone
@@ -22,22 +23,23 @@ from .jobs import FRAMES, KEY_POSES, METHODS, TRACKS, GeometricJobs, Row, key_of
 from .suite import LEVELS, GeometricSuite, cells, read_suite, suite_line
 
 CHUNK, DRAWN_AT_ONCE = 10, 5
-"""Scenarios of a job."""
+"""Scenarios per job, for making paths and for drawing scenarios."""
 WALL_SECONDS = 600.0
+"""Real time after which a job counts as hung [s]."""
 SPARSE_EACH, FRAMES_EACH = 12, 6
-"""Scenarios for each part and level of these tracks, at most."""
+"""Largest number of scenarios for each part and level of the tracks "sparse" and "frames"."""
 EXTRAS = {"dmp-goal": "movement_primitives", "dmp-world": "movement_primitives", "rrt": "ompl"}
-"""Modules that path makers need."""
+"""Modules required by path generators."""
 
 
 class GeometricRequest(NamedTuple):
-    """What is wanted.
+    """A request for geometric results.
 
     Attributes:
-        count: of scenarios.
-        seed: that they are drawn from.
-        methods: names of METHODS.
-        workers: processes.
+        count: number of scenarios.
+        seed: random seed of the scenarios.
+        methods: names from `METHODS`.
+        workers: number of processes.
     """
 
     count: int
@@ -49,19 +51,19 @@ class GeometricRequest(NamedTuple):
 def run_geometric(
     count: int, seed: int, output: Path, *, methods: Sequence[str] = (), workers: int | None = None, quiet: bool = False
 ) -> int:
-    """Complete a folder of geometric results; returns the exit code.
+    """Complete a folder of geometric results, and return the exit code.
 
     Args:
-        count: of scenarios.
-        seed: that they are drawn from.
+        count: number of scenarios.
+        seed: random seed of the scenarios.
         output: the folder.
-        methods: names of METHODS; none: all but the sampler.
-        workers: processes; None: one for each core.
+        methods: names from `METHODS`; empty: all but the sampling planner.
+        workers: number of processes; None: one per core.
         quiet: print only the folder, and errors.
 
     Raises:
-        BadConfig: the folder holds other scenarios.
-        UnknownName: no such method.
+        BadConfig: the folder holds other scenarios, or a method needs a package that is not installed.
+        UnknownName: there is no such method.
         WorkerFailed: a worker died, or could not do its work.
     """
     say = console(stderr=True, quiet=quiet)
@@ -87,11 +89,15 @@ def run_geometric(
 
 
 def wanted_methods(names: Sequence[str], say: Any) -> tuple[str, ...]:
-    """The methods that are named, or all that can be run here but the sampler.
+    """Return the named methods, or all installed methods but the sampling planner.
+
+    Args:
+        names: names from `METHODS`; empty: all but the sampling planner.
+        say: console for notes.
 
     Raises:
-        UnknownName: no such method.
-        BadConfig: one that is named needs what is not installed.
+        UnknownName: there is no such method.
+        BadConfig: a named method needs a package that is not installed.
     """
     for name in names:
         if name not in METHODS:
@@ -109,16 +115,22 @@ def wanted_methods(names: Sequence[str], say: Any) -> tuple[str, ...]:
 
 
 def missing(name: str) -> bool:
-    """Whether what a method needs is not installed."""
+    """Return whether a method needs a package that is not installed."""
     module = EXTRAS.get(METHODS[name].generator)
     return module is not None and find_spec(module) is None
 
 
 def frozen_suite(folder: Path, order: GeometricRequest, dispatcher: Dispatcher) -> GeometricSuite:
-    """The scenarios of a folder, drawn if there are none.
+    """Return the scenarios of a folder; draw and write them if there are none.
+
+    Args:
+        folder: folder of the results.
+        order: the request.
+        dispatcher: gives jobs to workers.
 
     Raises:
-        BadConfig: they are others than those that are wanted.
+        BadConfig: the folder holds other scenarios than requested.
+        WorkerFailed: a worker died, or could not do its work.
     """
     suite = read_suite(folder)
     if suite is None:
@@ -136,7 +148,12 @@ def frozen_suite(folder: Path, order: GeometricRequest, dispatcher: Dispatcher) 
 
 
 def wanted_rows(suite: GeometricSuite, order: GeometricRequest) -> Iterator[tuple[str, str, str, int]]:
-    """Track, variant, method and scenario of every row, in the order of the tables."""
+    """Yield track, variant, method and scenario index of every requested row, in the order of the tables.
+
+    Args:
+        suite: the scenarios.
+        order: the request.
+    """
     for each in suite.scenarios:
         for method in chosen(TRACKS["paths"], order):
             yield "paths", each.level, method, each.index
@@ -152,12 +169,23 @@ def wanted_rows(suite: GeometricSuite, order: GeometricRequest) -> Iterator[tupl
 
 
 def chosen(names: Sequence[str], order: GeometricRequest) -> list[str]:
-    """Those methods of a track that are wanted."""
+    """Return the requested methods of a track.
+
+    Args:
+        names: methods of the track.
+        order: the request.
+    """
     return [name for name in names if name in order.methods]
 
 
 def first_of_each(suite: GeometricSuite, levels: Sequence[str], count: int) -> list[int]:
-    """The first scenarios of each part at some levels."""
+    """Return the indices of the first scenarios of each part and level.
+
+    Args:
+        suite: the scenarios.
+        levels: levels to include.
+        count: largest number of scenarios for each part and level.
+    """
     found = []
     for cell in cells():
         here = [each.index for each in suite.scenarios if (each.part, each.level) == cell and cell[1] in levels]
@@ -168,7 +196,18 @@ def first_of_each(suite: GeometricSuite, levels: Sequence[str], count: int) -> l
 def completed(
     folder: Path, suite: GeometricSuite, order: GeometricRequest, dispatcher: Dispatcher, say: Any
 ) -> list[Row]:
-    """All rows of the folder, in the tables' order; what is wanted and missing is made, and written as it comes."""
+    """Return all rows of the folder in the order of the tables; make and append the missing requested rows.
+
+    Args:
+        folder: folder of the results.
+        suite: the scenarios.
+        order: the request.
+        dispatcher: gives jobs to workers.
+        say: console for notes and progress.
+
+    Raises:
+        WorkerFailed: a worker died, or could not do its work.
+    """
     from rich.progress import Progress
 
     file = folder / f"rows-{suite.hash[:12]}.jsonl"
@@ -189,7 +228,12 @@ def completed(
 
 
 def jobs_for(folder: Path, todo: Iterable[tuple[str, str, str, int]]) -> list[Job]:
-    """Jobs of some scenarios each, with the methods that are missing of them."""
+    """Return jobs of several scenarios each for the missing rows.
+
+    Args:
+        folder: folder of the results.
+        todo: track, variant, method and scenario index of each missing row.
+    """
     groups: dict[tuple[str, str, int], list[str]] = {}
     for track, variant, method, index in todo:
         groups.setdefault((track, variant, index), []).append(method)
@@ -205,7 +249,15 @@ def jobs_for(folder: Path, todo: Iterable[tuple[str, str, str, int]]) -> list[Jo
 
 
 def recorded(file: Path, say: Any) -> dict[tuple[str, str, str, int], Row]:
-    """The rows of a file; a line that a crash tore is cut off, any other that is none is named and passed over."""
+    """Return the rows of a file; a line torn by a crash is cut off, other invalid lines are reported and skipped.
+
+    Args:
+        file: file of rows; it may be missing.
+        say: console for warnings.
+
+    Returns:
+        Rows by track, variant, method and scenario index.
+    """
     if not file.is_file():
         return {}
     data, rows = file.read_bytes(), {}
@@ -223,10 +275,14 @@ def recorded(file: Path, say: Any) -> dict[tuple[str, str, str, int], Row]:
 
 
 def answers(dispatcher: Dispatcher, jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
-    """The answers to jobs, as they come.
+    """Yield the answers to jobs as they arrive.
+
+    Args:
+        dispatcher: gives jobs to workers.
+        jobs: the jobs.
 
     Raises:
-        WorkerFailed: there is none, or an error.
+        WorkerFailed: a worker was lost twice, or answered with an error.
     """
     for outcome in dispatcher.results(jobs):
         answer = outcome.answer
@@ -238,6 +294,11 @@ def answers(dispatcher: Dispatcher, jobs: Sequence[Job]) -> Iterator[dict[str, A
 
 
 def chunks(values: Sequence[int], size: int) -> list[list[int]]:
-    """Lists of at most `size`."""
+    """Split values into consecutive lists.
+
+    Args:
+        values: the values.
+        size: largest length of a list.
+    """
     every = list(values)
     return [every[k : k + size] for k in range(0, len(every), size)]

@@ -1,4 +1,4 @@
-"""One figure for each track of the geometric tier, as a paper would print it."""
+"""One figure for each track of the geometric tier, as in a paper."""
 
 from __future__ import annotations
 
@@ -27,11 +27,19 @@ COLORS = {
 }
 MARKERS = {"tsia": "o", "decoupled": "s", "replay": "x", "dmp-goal": "^", "dmp-goal, screws": "v", "dmp-world": "D"}
 ZERO = 1e-12
-"""Gaps [mm] below this are drawn here: the axis is logarithmic."""
+"""Lower bound of the drawn gaps [mm]: the axis is logarithmic."""
 
 
 def draw(folder: Path, rows: Sequence[Row]) -> list[Path]:
-    """Draw what there are rows of, as PNG and PDF; returns the files."""
+    """Draw a figure for each track with rows, as PNG and PDF.
+
+    Args:
+        folder: folder of the figures.
+        rows: rows of all tracks.
+
+    Returns:
+        The files written.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -52,7 +60,7 @@ def draw(folder: Path, rows: Sequence[Row]) -> list[Path]:
 
 
 def _paths(plt: Any, rows: Sequence[Row]) -> Any:
-    """Shares that reach the goal and stay clear, and that also keep the constraint; tilt while carrying; rim drift."""
+    """Draw shares of clear paths to the goal and of those that keep the constraint, tilt while carrying, rim drift."""
     names = methods_in(rows)
     figure, axes = plt.subplots(1, 4, figsize=(8.4, 0.7 + 0.26 * len(names)), sharey=True, layout="constrained")
     levels = sorted({row["level"] for row in rows})
@@ -95,7 +103,7 @@ def _spread(axes: Any, at: float, values: Sequence[float], color: str, alpha: fl
 
 
 def _sparse(plt: Any, rows: Sequence[Row]) -> Any:
-    """Rim drift of the pour and deviation of every segment against the number of key poses."""
+    """Draw the rim drift of the pour and the deviation of every segment against the number of key poses."""
     names, parts = methods_in(rows), list(dict.fromkeys(row["part"] for row in rows))
     shown = [(part, "rim_drift", "rim drift [mm]") for part in parts if part == "pour carry"]
     shown += [(part, "aligned", "off the demonstration [mm]") for part in parts]
@@ -138,7 +146,7 @@ def _sparse(plt: Any, rows: Sequence[Row]) -> Any:
 
 
 def _frames(plt: Any, rows: Sequence[Row]) -> Any:
-    """How far each path moves when a frame is changed; every scenario a dot, without and with obstacles."""
+    """Draw the displacement of each path after a change of frame; every scenario is a dot, filled without obstacles."""
     names = methods_in(rows)
     figure, grid = plt.subplots(
         1, len(FRAMES), figsize=(1.9 * len(FRAMES), 0.8 + 0.3 * len(names)), sharey=True, sharex=True,

@@ -1,8 +1,8 @@
-"""What a worker of the geometric tier does: scenarios drawn, paths made and measured.
+"""Worker of the geometric tier: draws scenarios, makes paths and measures them.
 
-Three tracks: `paths`, the levels; `sparse`, the demonstration thinned to some key poses; `frames`, the same path in
-another tool frame or another world, expressed back. A row depends on nothing but its scenario, track, variant and
-method; only its last number, the time, differs from run to run.
+Three tracks: `paths`, the levels; `sparse`, the demonstration thinned to a few key poses; `frames`, the same path made
+in another tool frame or another world, and expressed back. A row depends on its scenario, track, variant and method
+only; just its last number, the time, differs from run to run.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ...baselines.key_poses import Join, filled
 from ...baselines.motion.motion_method import MotionPlanner
 from ...baselines.motion.path_generators import straight_path
 from ...baselines.paths_only import made_path, motion_planner
+from ...planner import Obstacle, Pose, PosePath, guide_index, imitated_path
 from ...planner.errors import NotFinite, NotUnit, OneDemoError, PlanFailed
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle
 from ...planner.imitation.segmentation import key_poses
-from ...planner.imitation.tsia import GUIDE_START, guide_index, imitated_path, screw_path
+from ...planner.imitation.tsia import GUIDE_START, screw_path
+from ...planner.robot.body import TOOL_CAPSULE
 from ..atomic_files import sha256_of
 from ..workers.worker_process import main
 from . import metrics
@@ -33,30 +33,33 @@ from .parts import CarriedPart, holding, part_named, robot, tool_of
 from .suite import GeometricScenario, GeometricSuite, drawn, read_suite
 
 SHIPPED_GUIDE = 0.5
+"""Guiding pose of the shipped configs, as a fraction of the path length."""
 COMMON = 0.3
-"""Fraction of the demonstration behind which all methods are compared with it when it is thinned: key poses move the
-guiding pose a little."""
+"""Fraction of the demonstration from which all methods are compared with it if it is thinned: key poses shift the
+guiding pose slightly."""
 LEAST_TURNING = 0.1
-"""Rotation [rad] of a demonstration below which a path's is not divided by it."""
+"""Rotation [rad] of a demonstration below which a path's rotation is not divided by it."""
 KEY_POSES = (600, 60, 24, 12, 6, 4)
+"""Numbers of key poses in the track "sparse"."""
 TOOL = Pose.from_position_quaternion(np.full(3, 0.1 / math.sqrt(3.0)), [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
-"""The other tool frame in the tcp: 10 cm away, turned by 90 degrees."""
+"""The other tool frame in the tcp's frame: 10 cm away, turned by 90 degrees."""
 WORLD = Pose.from_position_quaternion([0.7, -0.4, 0.3], [0.5, 0.1, -0.7, 0.5])
-"""The other world: nothing of it is along the old one's axes."""
+"""The other world frame: none of its axes is parallel to an old axis."""
 FRAMES = ("tool", "tool, guide by length", "world", "recorded elsewhere")
-"""What is changed: the tool frame, with the same guiding pose or with the one that its own length gives; all of the
-world; or the world of the demonstration alone, as if it had been recorded on another table."""
+"""Changed frames: the tool frame, with the same guiding pose or with the guiding pose at the same fraction of the new
+path length; the whole world; or the demonstration's world alone, as if recorded on another table."""
 ELSEWHERE = Pose.from_yaw([0.3, 0.5, 0.0], np.deg2rad(70.0))
+"""Displacement of a demonstration recorded on another table."""
 
 
 class Method(NamedTuple):
     """A row of the tables.
 
     Attributes:
-        generator: the policy whose path maker it is.
-        guide: fraction at which its blend ends.
-        join: how it reads the way between key poses.
-        planned: the path is that of an arm whose motion was planned; else that of a tool that flies freely.
+        generator: name of the policy whose path generator is used.
+        guide: fraction of the path length at which blending into the imitated path ends.
+        join: interpolation between key poses.
+        planned: True: the path of an arm whose motion was planned; False: the path of a free-flying tool.
     """
 
     generator: str
@@ -78,38 +81,64 @@ METHODS = {
     "potential": Method("potential", join=screw_path),
     "rrt": Method("rrt", planned=True),
 }
-"""By name: `screw` is the whole method, `repet` imitation with escape trees alone; joins matter where key poses are
-few."""
+"""Methods by name: `screw` is the whole method, `repet` is imitation with escape trees alone; joins matter if key poses
+are few."""
 TRACKS = {
     "paths": tuple(name for name in METHODS if name != "dmp-goal, screws"),
     "sparse": ("tsia", "decoupled", "replay", "dmp-goal", "dmp-goal, screws", "dmp-world"),
     "frames": ("repet", "tsia", "decoupled", "replay", "dmp-goal", "dmp-world", "potential"),
 }
-"""The methods of each track: where two must give the same path, one of them."""
+"""Methods of each track; of methods that must give equal paths, one is included."""
 Row = dict[str, Any]
+"""Numbers of one path."""
 
 
 def rows_of(scenario: GeometricScenario, track: str, variant: str, methods: Sequence[str]) -> list[Row]:
-    """A row for each method."""
+    """Return a row for each method.
+
+    Args:
+        scenario: the scenario.
+        track: one of `TRACKS`.
+        variant: variant of the track: level, number of key poses, or one of `FRAMES`.
+        methods: names from `METHODS`.
+    """
     one = {"paths": path_row, "sparse": sparse_row, "frames": frames_row}[track]
     head = {"track": track, "variant": variant, "index": scenario.index, "part": scenario.part, "level": scenario.level}
     return [{**head, "method": name, **one(scenario, variant, name)} for name in methods]
 
 
 def path_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
-    """The numbers of a method's path in a scenario."""
+    """Return the numbers of a method's path in a scenario.
+
+    Args:
+        scenario: the scenario.
+        variant: unused; the signature is common to all tracks.
+        name: name of the method.
+    """
     return measured(scenario, name, part_named(scenario.part).shown)
 
 
 def sparse_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
-    """The numbers of a path that was made from so many key poses, against the whole demonstration."""
+    """Return the numbers of a path made from a few key poses, compared with the whole demonstration.
+
+    Args:
+        scenario: the scenario.
+        variant: number of key poses.
+        name: name of the method.
+    """
     part = part_named(scenario.part)
     keys = key_poses(part.shown, int(variant))
     return measured(scenario, name, filled(keys, METHODS[name].join), aligned_from=COMMON)
 
 
 def frames_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
-    """How far a path made in another frame, expressed back, is from the path made in the first."""
+    """Return the gap between a path made in another frame, expressed back, and the path made in the original frame.
+
+    Args:
+        scenario: the scenario.
+        variant: one of `FRAMES`.
+        name: name of the method.
+    """
     part, begun = part_named(scenario.part), time.perf_counter()
     shown, start, goal, obstacles, tool = (
         part.shown, scenario.start, scenario.goal, scenario.obstacles, tool_of(part.name),
@@ -134,10 +163,10 @@ def frames_row(scenario: GeometricScenario, variant: str, name: str) -> Row:
 
 
 def _in_frame(tool: np.ndarray, tcp_from_other: Pose) -> np.ndarray:
-    """Capsules (m, 7) of the tcp's frame in another frame that moves with it."""
+    """Return capsules (m, 7) of the tcp's frame in another frame that moves with the tcp."""
     back = tcp_from_other.inverse()
-    ends = tool[:, :6].reshape(-1, 3) @ back.rotation.T + back.position
-    return np.column_stack([ends.reshape(-1, 6), tool[:, 6]])
+    ends = tool[:, : TOOL_CAPSULE.radius].reshape(-1, 3) @ back.rotation.T + back.position
+    return np.column_stack([ends.reshape(-1, 6), tool[:, TOOL_CAPSULE.radius]])
 
 
 def made(
@@ -150,10 +179,20 @@ def made(
     tool: np.ndarray,
     guide: int | None = None,
 ) -> PosePath:
-    """A method's path.
+    """Return a method's path.
+
+    Args:
+        scenario: the scenario.
+        name: name of the method.
+        shown: the demonstrated path.
+        start: start pose of the tcp.
+        goal: goal pose of the tcp.
+        obstacles: static obstacles.
+        tool: (m, 7) capsules in the tcp's frame, see `Body.tool`; for free-flying tools.
+        guide: index of the guiding pose in `shown`; None: by the method's fraction.
 
     Raises:
-        PlanFailed: it finds none.
+        PlanFailed: no path was found.
     """
     method = METHODS[name]
     settings = {"motion": {"guide": method.guide}}
@@ -172,13 +211,14 @@ def _planner(name: str, part: str) -> MotionPlanner:
 
 
 def measured(scenario: GeometricScenario, name: str, shown: PosePath, aligned_from: float | None = None) -> Row:
-    """Make a path and take its numbers; what there is none of is None.
+    """Make a path and return its numbers; numbers that do not exist are None.
 
     Args:
-        scenario: where.
-        name: the method.
-        shown: the demonstration as the method gets it.
-        aligned_from: fraction of the demonstration from which on it is compared; None: the method's guiding pose.
+        scenario: the scenario.
+        name: name of the method.
+        shown: the demonstrated path given to the method.
+        aligned_from: fraction of the demonstration from which the path is compared with it; None: the method's guiding
+            pose.
     """
     part, begun = part_named(scenario.part), time.perf_counter()
     try:
@@ -193,7 +233,14 @@ def measured(scenario: GeometricScenario, name: str, shown: PosePath, aligned_fr
 
 
 def numbers(part: CarriedPart, path: PosePath, goal: Pose, aligned_from: float) -> Row:
-    """The numbers of a path that do not depend on obstacles."""
+    """Return the numbers of a path that do not depend on obstacles.
+
+    Args:
+        part: the carried part.
+        path: the path.
+        goal: goal pose of the tcp.
+        aligned_from: fraction of the demonstration from which the path is compared with it.
+    """
     distance, angle = metrics.ending(path, goal)
     turned = metrics.turning(part.shown)
     values = {
@@ -212,7 +259,7 @@ def numbers(part: CarriedPart, path: PosePath, goal: Pose, aligned_from: float) 
 
 
 def _reason(failure: OneDemoError) -> str:
-    """Why there is no path: there is none, or its numbers ran away."""
+    """Return why there is no path: the planner's reason, or that its numbers diverged."""
     return failure.reason if isinstance(failure, PlanFailed) else "diverged"
 
 
@@ -221,9 +268,9 @@ def _since(begun: float) -> float:
 
 
 class GeometricJobs:
-    """Does the jobs of geometric runs.
+    """Worker object of geometric runs.
 
-    Its jobs are "draw" (seed, indices) and "rows" (folder, track, variant, methods, indices).
+    Kinds of jobs: "draw" (seed, indices) and "rows" (folder, track, variant, methods, indices).
     """
 
     def __init__(self) -> None:
@@ -231,7 +278,7 @@ class GeometricJobs:
         self._warm = False
 
     def do(self, job: dict[str, Any]) -> dict[str, Any]:
-        """The answer to a job."""
+        """Return the answer to a job."""
         try:
             if job["kind"] == "draw":
                 return {"drawn": [drawn(index, job["seed"]) for index in job["indices"]]}
@@ -239,7 +286,7 @@ class GeometricJobs:
                 self._suite = self._suite or read_suite(Path(job["folder"]))
                 assert self._suite
                 chosen = [self._suite.scenarios[index] for index in job["indices"]]
-                if not self._warm:  # so that no row's time is that of compiling
+                if not self._warm:  # so that no row's time includes compilation
                     rows_of(chosen[0], job["track"], job["variant"], job["methods"])
                     self._warm = True
                 rows = [rows_of(each, job["track"], job["variant"], job["methods"]) for each in chosen]
@@ -249,17 +296,17 @@ class GeometricJobs:
             return {"refused": str(error), "key": ""}
 
     def close(self) -> None:
-        """Forget the scenarios."""
+        """Release the scenarios."""
         self._suite = None
 
 
 def key_of(row: Mapping[str, Any]) -> tuple[str, str, str, int]:
-    """What a row is told from others by."""
+    """Return the identity of a row: track, variant, method and scenario index."""
     return row["track"], row["variant"], row["method"], row["index"]
 
 
 def results_hash(rows: Iterable[Row]) -> str:
-    """sha256 of the rows without their times: the same for any number of workers."""
+    """Return the sha256 of the rows without their times: equal for any number of workers."""
     return sha256_of([{key: value for key, value in row.items() if key != "ms"} for row in rows])
 
 

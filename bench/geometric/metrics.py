@@ -1,44 +1,68 @@
-"""Numbers of a path without physics, the same for whoever made it."""
+"""Numbers of a path without physics, equal for every method."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...planner import Pose, PosePath, guide_index, imitated_path
 from ...planner.geometry import dualquat as dq
-from ...planner.geometry.pose import METERS_PER_RADIAN, Pose, PosePath
-from ...planner.imitation.tsia import guide_index, imitated_path
+from ...planner.geometry.pose import METERS_PER_RADIAN
 from .parts import POURING, CarriedPart
 
 REACHED, TURNED = 0.005, 0.05
-"""A goal is reached within these [m], [rad]; as the judge of plans has it."""
+"""Largest error [m], [rad] of a path's end that counts as reaching the goal; equal to the judge's of plans."""
 SAMPLES = 200
-"""Points, at equal steps of the tcp's way, that smoothness is taken from."""
+"""Number of points, at equal steps of the tcp's path length, used for smoothness."""
 FINE, COARSE = 45, 15
-"""Steps of the search for the nearest point on a screw: down to rounding, and to some micrometers."""
+"""Steps of the search for the nearest point on a screw: to rounding error, and to some micrometers."""
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+"""Ratio of the golden section."""
 
 
 def ending(path: PosePath, goal: Pose) -> tuple[float, float]:
-    """Distance [m] and angle [rad] of a path's end to the goal."""
+    """Return distance [m] and angle [rad] of a path's end to the goal.
+
+    Args:
+        path: path of the tcp.
+        goal: goal pose of the tcp.
+    """
     distance, angle = path[-1].distance_to(goal)
     return float(distance), float(angle)
 
 
 def is_reached(distance: float, angle: float) -> bool:
-    """Whether a path with these errors at its end reaches the goal."""
+    """Return whether a path with these errors at its end reaches the goal.
+
+    Args:
+        distance: distance to the goal [m].
+        angle: angle to the goal [rad].
+    """
     return distance <= REACHED and angle <= TURNED
 
 
 def tilt(part: CarriedPart, path: PosePath) -> float:
-    """Largest tilt while carrying [degrees]; before pouring begins, where something is poured."""
+    """Return the largest tilt while carrying [degrees]; if the part is a pour, before pouring begins.
+
+    Args:
+        part: the carried part.
+        path: path of the tcp.
+    """
     return float(np.degrees(part.tilts(part.carried(path)).max()))
 
 
 def rim_drift(part: CarriedPart, path: PosePath, goal: Pose) -> float | None:
-    """How far [m] the lip is, while the glass is tilted by more than 60 degrees, from where it was shown.
+    """Return the largest distance [m] of the lip from its demonstrated place while pouring.
 
-    Both as seen from the goal, which stands for the target glass. The demonstration's lip goes along a curve, of which
-    the nearest point counts. None where nothing is poured; NaN where a path never tilts that far.
+    Pouring means a tilt of more than 60 degrees. Both lips are expressed relative to the goal, which represents the
+    target glass. The demonstrated lip moves along a curve, whose nearest point counts.
+
+    Args:
+        part: the carried part.
+        path: path of the tcp.
+        goal: goal pose of the tcp.
+
+    Returns:
+        The drift; None if nothing is poured, NaN if the path never tilts that far.
     """
     if part.lip is None:
         return None
@@ -50,7 +74,7 @@ def rim_drift(part: CarriedPart, path: PosePath, goal: Pose) -> float | None:
 
 
 def _to_line(point: np.ndarray, line: np.ndarray) -> float:
-    """Distance of a point (3,) to the straight pieces between points (n, 3)."""
+    """Return the distance [m] of a point (3,) to the polyline through points (n, 3)."""
     a, along = line[:-1], np.diff(line, axis=0)
     share = ((point - a) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300)
     nearest = a + np.clip(share, 0.0, 1.0)[:, None] * along
@@ -58,20 +82,20 @@ def _to_line(point: np.ndarray, line: np.ndarray) -> float:
 
 
 def path_length(path: PosePath) -> float:
-    """Length of the tcp's way [m]."""
+    """Return the length of the tcp's path [m]; rotations do not count."""
     return float(np.linalg.norm(np.diff(path.positions, axis=0), axis=1).sum())
 
 
 def turning(path: PosePath) -> float:
-    """Sum of all rotations [rad]."""
+    """Return the sum of all rotations [rad]."""
     return float(dq.pose_distance(path.dqs[:-1], path.dqs[1:])[1].sum())
 
 
 def jerk(path: PosePath) -> float:
-    """Natural logarithm of the dimensionless jerk of the tcp at constant speed; less is smoother.
+    """Return the natural logarithm of the dimensionless jerk of the tcp at constant speed; less is smoother.
 
-    A path has no time: its points are taken at equal steps of its way, and jerk is their third difference.
-    NaN where the tcp stays in place.
+    A path has no time: its points are sampled at equal steps of its length, and jerk is their third difference. NaN if
+    the tcp does not move.
     """
     positions = path.positions
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
@@ -85,16 +109,29 @@ def jerk(path: PosePath) -> float:
 
 
 def aligned_deviation(part: CarriedPart, path: PosePath, goal: Pose, guide: float) -> float:
-    """Method-aligned: largest distance [m] of the goal-aligned demonstration behind the guiding pose to a path.
+    """Return the largest distance [m] of the goal-aligned demonstration after the guiding pose to a path.
 
-    In screw length. What follows imitation alone has none by construction, so this says nothing about who is better.
+    Weighted distance (0.2 m/rad). "Method-aligned": for methods that follow the imitated path it is zero by
+    construction, so it is no measure of merit.
+
+    Args:
+        part: the carried part.
+        path: path of the tcp.
+        goal: goal pose of the tcp.
+        guide: fraction of the path length at the guiding pose.
     """
     imitated = imitated_path(part.shown, goal)
     return curve_gap(imitated[guide_index(imitated, guide) :], path, COARSE)
 
 
 def curve_gap(poses: PosePath, path: PosePath, refinements: int = FINE) -> float:
-    """Largest distance of poses to a path [m], in screw length; between its own poses the path is a screw."""
+    """Return the largest weighted distance [m] of poses to a path; between its poses the path is a screw.
+
+    Args:
+        poses: the poses.
+        path: the path.
+        refinements: steps of the search on each screw.
+    """
     if len(path) == 1:
         return float(_gap(poses.dqs, path.dqs).max())
     distance = np.linalg.norm(poses.positions[:, None] - path.positions, axis=-1)
@@ -112,7 +149,7 @@ def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _to_screws(poses: np.ndarray, first: np.ndarray, last: np.ndarray, refinements: int) -> np.ndarray:
-    """(n,) distances of poses (n, 8) to screws, by golden sections."""
+    """Return the distances (n,) [m] of poses (n, 8) to screws, by golden-section search."""
     low, high = np.zeros(len(poses)), np.ones(len(poses))
     for _ in range(refinements):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)

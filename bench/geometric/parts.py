@@ -1,4 +1,4 @@
-"""What the geometric tier carries: segments of the shipped demonstrations, what is held, what must be kept."""
+"""Carried parts of the geometric tier: segments of the shipped demonstrations, held objects, constraints."""
 
 from __future__ import annotations
 
@@ -9,35 +9,33 @@ from typing import NamedTuple
 import numpy as np
 
 from ...baselines.key_poses import DENSE
-from ...configs.shipped_files import shipped_demonstration
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Box, Cylinder, Shape
-from ...planner.imitation.demonstration_files import load_demonstration
+from ...configs import load_demonstration
+from ...envs import ROBOTS
+from ...planner import Arm, Body, Box, Cylinder, Pose, PosePath, Shape
 from ...planner.imitation.segmentation import resampled
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
 
 ROBOT = "Panda"
 TILTING = np.deg2rad(5.0)
 """Tilt of the held object [rad] at which a demonstrated pour begins."""
 POURING, SLACK = np.deg2rad(60.0), np.deg2rad(5.0)
-"""Tilt [rad] from which on the lip must be where it was shown, and how much earlier its curve begins."""
+"""Tilt [rad] from which the lip must be at its demonstrated place, and how much earlier the demonstrated curve
+begins."""
 FINE = 0.0005
-"""Screw length [m] between the points of that curve."""
+"""Path length (weighted) [m] between the points of that curve."""
 
 
 @dataclass(frozen=True)
 class PartKind:
-    """A segment.
+    """A kind of carried part: a segment of a shipped demonstration.
 
     Attributes:
-        demonstration: the shipped one.
-        grasping: the segment at whose end the object is taken.
-        segment: the one that is carried out.
-        shape: of what is held; None: the box that the demonstration says.
-        level: True: the hand's approach axis is to stay level; False: the held object is to stay upright.
-        raised: how far [m] above its ends the nominal way is that obstacles are put on.
-        blocked: obstacles have room on it.
+        demonstration: name of the shipped demonstration.
+        grasping: segment that ends with the grasp of the object.
+        segment: segment to be imitated.
+        shape: shape of the held object; None: a box of the size in the demonstration.
+        level: True: the hand's approach axis must stay level; False: the held object must stay upright.
+        raised: height [m] above start and goal of the nominal path on which obstacles are placed.
+        blocked: True if obstacles can be placed on the path.
     """
 
     demonstration: str
@@ -55,11 +53,11 @@ KINDS = {
     "shelve carry": PartKind("shelve", "reach", "carry", level=True),
     "shelve insert": PartKind("shelve", "reach", "insert", blocked=False),
 }
-"""By name. On its way turned from lying to standing, a book has no upright; its hand stays level."""
+"""Kinds by name. A book that turns from lying to standing has no upright axis, so its hand must stay level instead."""
 
 
 class CarriedPart:
-    """A segment with what is held.
+    """A segment with its held object.
 
     Args:
         name: one of `KINDS`.
@@ -67,7 +65,7 @@ class CarriedPart:
 
     def __init__(self, name: str):
         kind = KINDS[name]
-        demonstration = load_demonstration(shipped_demonstration(kind.demonstration))
+        demonstration = load_demonstration(kind.demonstration)
         grasp = demonstration.segment(kind.grasping)
         carried = demonstration.segment(kind.segment)
         standing = _upright(grasp.reference_pose)
@@ -80,20 +78,21 @@ class CarriedPart:
         self.joints = demonstration.joint_positions[carried.start]
         self.reference = carried.reference_pose.position if carried.reference else self.shown[-1].position
         up = demonstration.path[grasp.stop].rotation.T @ standing.rotation[:, 2]
-        if kind.segment == "insert":  # it was taken lying, and stands at the end
+        if kind.segment == "insert":  # the book was grasped lying, and stands at the end
             up = self.shown[-1].rotation.T @ np.array([0.0, 0.0, 1.0])
         self.axis = np.array([0.0, 0.0, 1.0]) if kind.level else up
         self.shown_tilt = float(np.degrees(self.tilts(self.carried(self.shown)).max()))
 
     def tilts(self, path: PosePath) -> np.ndarray:
-        """(n,) [rad]: of the held object against upright, or of the hand against level."""
+        """Return tilts (n,) [rad]: of the held object from upright, or of the hand from level."""
         heights = np.clip(_turned(path, self.axis)[:, 2], -1.0, 1.0)
         return np.abs(np.arcsin(heights)) if self.kind.level else np.arccos(heights)
 
     def carried(self, path: PosePath) -> PosePath:
-        """The part of a path before pouring begins; all of it where nothing is poured.
+        """Return the part of a path before pouring begins; the whole path if nothing is poured.
 
-        Pouring may begin where the lip first is as near its last place as it was when it began in the demonstration.
+        Pouring begins at the first pose whose lip is as near its final place as the demonstrated lip was when the
+        demonstrated pour began.
         """
         if self.lip is None:
             return path
@@ -103,7 +102,7 @@ class CarriedPart:
 
     @cached_property
     def lip(self) -> np.ndarray | None:
-        """(3,) the glass's lip in the tcp's frame, the lowest point of its rim at the end; None without a glass."""
+        """(3,) the glass's lip in the tcp's frame [m], the lowest point of its rim at the end; None without a glass."""
         if not isinstance(self.shape, Cylinder):
             return None
         glass = self.tcp_from_object
@@ -119,23 +118,23 @@ class CarriedPart:
 
     @cached_property
     def lip_curve(self) -> np.ndarray:
-        """(n, 3) where the demonstration has the lip, as seen from its end, while the glass is tilted [m]."""
+        """(n, 3) demonstrated lip relative to the demonstration's end, while the glass is tilted [m]."""
         dense = resampled(self.shown, FINE)
         return self.lips(dense.moved(self.shown[-1].inverse()))[self.tilts(dense) > POURING - SLACK]
 
     def lips(self, path: PosePath) -> np.ndarray:
-        """(n, 3) the lip in the world [m]."""
+        """Return the lip (n, 3) in the world along a path [m]."""
         assert self.lip is not None
         return path.positions + _turned(path, self.lip)
 
 
 def _upright(pose: Pose) -> Pose:
-    """A pose whose z axis is the world's: what stands is measured a little tilted."""
+    """Return a pose with its z axis along the world's: standing objects are measured slightly tilted."""
     return Pose.from_yaw(pose.position, pose.yaw)
 
 
 def _turned(path: PosePath, vector: np.ndarray) -> np.ndarray:
-    """(n, 3) a vector of the tcp's frame in the world's axes."""
+    """Return a vector of the tcp's frame in the world's axes along a path (n, 3)."""
     w, turn = path.quaternions[:, :1], path.quaternions[:, 1:]
     cross = np.cross(turn, vector)
     return vector + 2.0 * (w * cross + np.cross(turn, cross))
@@ -143,12 +142,12 @@ def _turned(path: PosePath, vector: np.ndarray) -> np.ndarray:
 
 @cache
 def part_named(name: str) -> CarriedPart:
-    """A part, loaded once."""
+    """Return a carried part by name; loaded once."""
     return CarriedPart(name)
 
 
 class ArmWithBody(NamedTuple):
-    """Whose hand moves.
+    """A robot for planning.
 
     Attributes:
         arm: its kinematics.
@@ -161,21 +160,21 @@ class ArmWithBody(NamedTuple):
 
 @cache
 def robot() -> ArmWithBody:
-    """The Panda."""
+    """Return the Panda."""
     from ...envs.scene.robot_bodies import robot_body
     from ...envs.scene.scene import compiled_scene
 
-    return ArmWithBody(compiled_scene(ROBOT).arms[0].arm, robot_body(ROBOT))
+    return ArmWithBody(compiled_scene(ROBOTS[ROBOT]).arms[0].arm, robot_body(ROBOTS[ROBOT]))
 
 
 @cache
 def holding(name: str) -> Body:
-    """The Panda's body with what a part holds."""
+    """Return the Panda's body with the object of a part in its hand."""
     part = part_named(name)
     return robot().body.holding("held", part.shape, part.tcp_from_object, robot().arm)
 
 
 @cache
 def tool_of(name: str) -> np.ndarray:
-    """(m, 7) capsules of hand and held object, see `Body.tool`."""
+    """Return the capsules (m, 7) of hand and held object, see `Body.tool`."""
     return holding(name).tool(robot().arm)

@@ -1,4 +1,4 @@
-"""What comes of a geometric run: a CSV for each track, tables, figures."""
+"""Output of a geometric run: a CSV for each track, tables, figures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,13 @@ SUMMARY = "geometric.md"
 
 
 def write_geometric(folder: Path, suite: GeometricSuite, rows: Sequence[Row]) -> None:
-    """Write everything into the folder."""
+    """Write CSV files, tables and figures into the folder.
+
+    Args:
+        folder: folder of the results.
+        suite: the scenarios.
+        rows: rows of all tracks.
+    """
     from .figures import draw
 
     for track in TRACKS:
@@ -28,7 +34,7 @@ def write_geometric(folder: Path, suite: GeometricSuite, rows: Sequence[Row]) ->
 
 
 def csv_text(rows: Sequence[Row]) -> str:
-    """Rows as CSV; empty where there is no number."""
+    """Return rows as CSV; missing numbers are empty."""
     keys = list(dict.fromkeys(key for row in rows for key in row))
     out = io.StringIO()
     writer = csv.DictWriter(out, keys, lineterminator="\n")
@@ -38,7 +44,12 @@ def csv_text(rows: Sequence[Row]) -> str:
 
 
 def summary(suite: GeometricSuite, rows: Sequence[Row]) -> str:
-    """The tables."""
+    """Return the page with all tables as Markdown.
+
+    Args:
+        suite: the scenarios.
+        rows: rows of all tracks.
+    """
     lines = [
         "# Geometric tier",
         "",

@@ -1,4 +1,4 @@
-"""The frozen scenarios of the geometric tier: drawn by seed, feasible for the arm, the same for every method."""
+"""The frozen scenarios of the geometric tier: drawn by seed, feasible for the arm, and equal for every method."""
 
 from __future__ import annotations
 
@@ -10,39 +10,40 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.core.obstacle_placement import ObstacleRequest, PlacementContext, PlacementMotion, placed
-from ...envs.simulation.moving_obstacles import ScheduledObstacle
+from ...configs import BadConfig
+from ...envs import ScheduledObstacle
+from ...envs.core.obstacle_placement import placed
+from ...envs.core.placement_context import ObstacleRequest, PlacementContext, PlacementMotion
+from ...planner import Box, Capsule, Obstacle, Pose, Shape, Sphere
 from ...planner.control.inverse_kinematics import inverse_kinematics
-from ...planner.errors import BadConfig, BadOption
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Capsule, Obstacle, Shape, Sphere
+from ...planner.errors import BadOption
 from ..atomic_files import canonical, sha256_of, write_whole
 from .parts import KINDS, CarriedPart, part_named, robot
 
 FILE = "suite.jsonl"
 VERSION = 1
 DIGITS = 6
-"""Decimals that positions, quaternions and sizes are rounded to: what is drawn is what is written."""
+"""Decimals of positions, quaternions and sizes; values are rounded when drawn, so that the file holds them exactly."""
 TRIES = 400
-"""Draws for one scenario."""
+"""Largest number of draws per scenario."""
 MARGIN = 0.05
-"""Distance [rad] of the postures at both ends to the joint limits."""
+"""Smallest distance [rad] of the postures at start and goal to the joint limits."""
 SEEDS = 12
-"""Starts of the inverse kinematics."""
+"""Initial guesses of the inverse kinematics."""
 FLOOR = 0.8
 """Height of the table top [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """How far ends are moved.
+    """Ranges of the random displacements of start and goal.
 
     Attributes:
-        start: [m] to each side; upwards and downwards a fourth of it.
-        start_yaw: [rad].
-        goal: as `start`.
-        goal_yaw: [rad].
-        obstacles: largest number of obstacles; at least one, if any.
+        start: displacement of the start to each side [m]; a fourth of it upwards and downwards.
+        start_yaw: rotation of the start about the vertical to each side [rad].
+        goal: displacement of the goal, as `start`.
+        goal_yaw: rotation of the goal, as `start_yaw`.
+        obstacles: largest number of obstacles, the smallest being one; 0: none.
     """
 
     start: float
@@ -65,14 +66,14 @@ class GeometricScenario:
     """A path to make.
 
     Attributes:
-        index: in the suite.
+        index: index in the suite.
         part: one of `KINDS`.
         level: one of `LEVELS`.
-        start: of the tcp.
-        goal: of the tcp.
-        joints: (dof,) of the arm at the start.
-        obstacles: that stand in the way.
-        draws: until it was feasible.
+        start: start pose of the tcp.
+        goal: goal pose of the tcp.
+        joints: (dof,) posture of the arm at the start [rad].
+        obstacles: static obstacles on the path.
+        draws: number of draws until the scenario was feasible.
     """
 
     index: int
@@ -86,15 +87,19 @@ class GeometricScenario:
 
 
 def cells() -> list[tuple[str, str]]:
-    """Parts and levels that there are scenarios of."""
+    """Return the combinations of part and level that have scenarios."""
     return [(part, level) for part, kind in KINDS.items() for level in LEVELS if kind.blocked or level != "L3"]
 
 
 def drawn(index: int, seed: int) -> dict[str, Any]:
-    """Scenario `index` of a suite as it is written.
+    """Draw a scenario of a suite, and return it as written in the file.
+
+    Args:
+        index: index in the suite.
+        seed: random seed of the suite.
 
     Raises:
-        BadOption: none of many draws was feasible.
+        BadOption: none of `TRIES` draws was feasible.
     """
     name, level = cells()[index % len(cells())]
     part, rng = part_named(name), np.random.default_rng([seed, index])
@@ -116,7 +121,7 @@ def drawn(index: int, seed: int) -> dict[str, Any]:
 
 
 def _drawn_once(part: CarriedPart, far: Range, rng: np.random.Generator) -> tuple | None:
-    """Start, goal, joints and obstacles of one draw; None where the arm cannot be at both ends, or has no room."""
+    """Draw start, goal, joints and obstacles; None if the arm cannot reach both ends or the obstacles do not fit."""
     shown = part.shown
     start = _moved(shown[0], shown[0].position, far.start, far.start_yaw, rng)
     goal = _moved(shown[-1], part.reference, far.goal, far.goal_yaw, rng)
@@ -127,15 +132,15 @@ def _drawn_once(part: CarriedPart, far: Range, rng: np.random.Generator) -> tupl
         return start, goal, joints, ()
     up = Pose.from_position_quaternion([0.0, 0.0, part.kind.raised])
     above = ((up @ goal,),) if part.kind.raised else ()
-    leg = PlacementMotion(up @ start, up @ goal, ((start,), *above, (goal,)), part.shape, part.tcp_from_object, 0)
-    stage = PlacementContext([leg], robot().arm, robot().body, joints, [], [], FLOOR)
+    motion = PlacementMotion(up @ start, up @ goal, ((start,), *above, (goal,)), part.shape, part.tcp_from_object, 0)
+    context = PlacementContext([motion], robot().arm, robot().body, joints, [], [], FLOOR)
     orders = [ObstacleRequest("static", 0)] * int(rng.integers(1, far.obstacles + 1))
-    found = placed(rng, "static", stage, orders)
+    found = placed(rng, "static", context, orders)
     return None if found is None else (start, goal, joints, found)
 
 
 def _moved(pose: Pose, center: np.ndarray, far: float, yaw: float, rng: np.random.Generator) -> Pose:
-    """A pose turned about the vertical through a center and moved, as it reads in the file."""
+    """Return a pose turned about the vertical through a center and displaced, rounded as in the file."""
     offset = rng.uniform(-1.0, 1.0, 3) * far * np.array([1.0, 1.0, 0.25])
     turn = Pose.from_yaw([0.0, 0.0, 0.0], rng.uniform(-yaw, yaw))
     away, back = (Pose.from_position_quaternion(sign * center + k * offset) for sign, k in ((1, 1), (-1, 0)))
@@ -143,7 +148,7 @@ def _moved(pose: Pose, center: np.ndarray, far: float, yaw: float, rng: np.rando
 
 
 def _posture(pose: Pose, near: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
-    """Joints (dof,) at a pose, away from the limits; None where none is found."""
+    """Return joints (dof,) [rad] at a pose, away from the limits; None if there is no solution."""
     arm = robot().arm
     for guess in [near, *rng.uniform(arm.lower, arm.upper, (SEEDS - 1, arm.dof))]:
         q = inverse_kinematics(arm, pose, guess)
@@ -157,7 +162,7 @@ def _rounded(values: Any) -> list[float]:
 
 
 def _pose(vector: Sequence[float]) -> Pose:
-    """A pose whose quaternion was rounded."""
+    """Return a pose from a vector with a rounded quaternion."""
     turn = np.array(vector[3:])
     return Pose.from_position_quaternion(vector[:3], turn / np.linalg.norm(turn))
 
@@ -183,7 +188,7 @@ def _shape(values: Mapping[str, Any]) -> Shape:
 
 
 def scenario_of(values: Mapping[str, Any]) -> GeometricScenario:
-    """A scenario from its line in the file."""
+    """Return a scenario from its line in the file."""
     obstacles = tuple(
         Obstacle(_shape(each), _pose(each["pose"]), name=f"obstacle{k}") for k, each in enumerate(values["obstacles"])
     )
@@ -194,11 +199,11 @@ def scenario_of(values: Mapping[str, Any]) -> GeometricScenario:
 
 
 class GeometricSuite:
-    """Scenarios as drawn.
+    """All scenarios of a geometric run.
 
     Args:
-        seed: that they were drawn from.
-        lines: one mapping each, in order.
+        seed: random seed of the scenarios.
+        lines: one mapping per scenario, in order.
     """
 
     def __init__(self, seed: int, lines: Sequence[Mapping[str, Any]]):
@@ -213,10 +218,10 @@ class GeometricSuite:
 
 
 def read_suite(folder: Path) -> GeometricSuite | None:
-    """The suite of a folder; None if there is none.
+    """Return the suite of a folder; None if there is none.
 
     Raises:
-        BadConfig: the file is none, of another version, or has been changed.
+        BadConfig: the file is invalid, of another version, or was changed.
     """
     file = folder / FILE
     if not file.is_file():
@@ -236,7 +241,7 @@ def read_suite(folder: Path) -> GeometricSuite | None:
 
 
 def suite_line(suite: GeometricSuite) -> str:
-    """How many scenarios there are, and how many draws were not feasible."""
+    """Return the numbers of scenarios and infeasible draws in words."""
     draws = sum(each.draws for each in suite.scenarios)
     count = len(suite.scenarios)
     refused = f"{draws - count} of {draws} draws were not feasible and were drawn anew"

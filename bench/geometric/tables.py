@@ -1,4 +1,4 @@
-"""The tables of the geometric tier, in Markdown."""
+"""Tables of the geometric tier, in Markdown."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from .suite import GeometricSuite, cells
 
 OURS = ("screw", "repet")
 TILT, DRIFT = 10.0, 0.015
-"""A constraint is kept up to these: tilt over the demonstration's [degrees], and rim drift [m], which is what the shown
-lip is inside the target glass."""
+"""Largest violation that still keeps the constraint: tilt in excess of the demonstration's [degrees], and rim drift
+[m], which is how far inside the target glass the demonstrated lip is."""
 
 
 class Column(NamedTuple):
     """A number of a path in a table.
 
     Attributes:
-        key: its name in the rows.
-        words: what it is called.
-        factor: from the recorded number to the printed one.
-        digits: that are printed.
+        key: name of the number in the rows.
+        words: name in tables.
+        factor: conversion factor from the recorded to the printed number.
+        digits: number of printed decimals.
     """
 
     key: str
@@ -40,21 +40,26 @@ COLUMNS = (
     Column("aligned", "method-aligned deviation [mm]", 1e3, 1),
     Column("ms", "ms per path", 1.0, 1),
 )
-"""Medians over the paths that were made."""
+"""Columns with medians over the paths that were made."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table."""
+    """Return the lines of a table.
+
+    Args:
+        head: names of the columns.
+        rows: one text per column.
+    """
     return ["| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *rows)] + [""]
 
 
 def is_done(row: Row) -> bool:
-    """Whether a path reaches its goal and touches nothing."""
+    """Return whether a path reaches its goal without contact."""
     return bool(row["reached"] and row["clear"])
 
 
 def is_kept(row: Row) -> bool:
-    """Whether it also keeps the constraint: the tilt while carrying, and the lip where it pours."""
+    """Return whether a clear path to the goal also keeps the constraint: tilt while carrying, and lip while pouring."""
     if not is_done(row):
         return False
     drift = row["rim_drift"]
@@ -62,18 +67,28 @@ def is_kept(row: Row) -> bool:
 
 
 def methods_in(rows: Sequence[Row]) -> list[str]:
-    """The methods of some rows, in the order of METHODS."""
+    """Return the methods of some rows, in the order of `METHODS`."""
     found = {row["method"] for row in rows}
     return [name for name in METHODS if name in found]
 
 
 def values_of(rows: Sequence[Row], key: str) -> list[float]:
-    """What there is of a number."""
+    """Return the known values of a number.
+
+    Args:
+        rows: the rows.
+        key: name of the number.
+    """
     return [row[key] for row in rows if row.get(key) is not None]
 
 
 def number(rows: Sequence[Row], column: Column) -> str:
-    """Median and interval of a number; – where there is none."""
+    """Return median and interval of a number in words; – without values.
+
+    Args:
+        rows: the rows.
+        column: the number and its format.
+    """
     found = [column.factor * value for value in values_of(rows, column.key)]
     if not found:
         return "–"
@@ -87,14 +102,19 @@ def _rounded(value: float, digits: int) -> str:
 
 
 def share(rows: Sequence[Row], claim: Callable[[Row], bool]) -> str:
-    """Of how many of the paths something is true, with Wilson's interval."""
+    """Return in words how many of the paths satisfy a claim, with Wilson's interval.
+
+    Args:
+        rows: the rows.
+        claim: the claim about a row.
+    """
     done = sum(map(claim, rows))
     low, high = wilson(done, len(rows))
     return f"{done} of {len(rows)} ({low:.2f} to {high:.2f})"
 
 
 def feasibility(suite: GeometricSuite) -> Iterator[str]:
-    """How many draws of each cell were feasible."""
+    """Yield a table of the feasible and infeasible draws of each cell."""
     lines = []
     for part, level in cells():
         mine = [each for each in suite.scenarios if (each.part, each.level) == (part, level)]
@@ -105,7 +125,7 @@ def feasibility(suite: GeometricSuite) -> Iterator[str]:
 
 
 def levels(rows: Sequence[Row]) -> Iterator[str]:
-    """A table for each segment and level."""
+    """Yield a table for each segment and level."""
     rows = [row for row in rows if row["track"] == "paths"]
     for part, level in cells():
         mine = [row for row in rows if (row["part"], row["level"]) == (part, level)]
@@ -124,7 +144,7 @@ def levels(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def paired(rows: Sequence[Row]) -> Iterator[str]:
-    """The method against each other one on the same scenarios with obstacles; p is corrected over a table."""
+    """Yield paired tests of our methods against each other method with obstacles; p is corrected over a table."""
     rows = [row for row in rows if row["track"] == "paths" and row["level"] == "L3"]
     names = methods_in(rows)
     for mine in OURS:
@@ -148,7 +168,7 @@ def paired(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def sparse(rows: Sequence[Row]) -> Iterator[str]:
-    """Numbers against key poses, for each segment."""
+    """Yield tables of numbers against key poses, for each segment."""
     rows = [row for row in rows if row["track"] == "sparse"]
     shown = (COLUMNS[1], COLUMNS[0], COLUMNS[5])
     for part in dict.fromkeys(row["part"] for row in rows):
@@ -169,7 +189,7 @@ def sparse(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def frames(rows: Sequence[Row]) -> Iterator[str]:
-    """How far paths move when frames are changed, without and with obstacles."""
+    """Yield tables of the displacement of paths after a change of frame, without and with obstacles."""
     rows = [row for row in rows if row["track"] == "frames"]
     for level in dict.fromkeys(row["level"] for row in rows):
         mine = [row for row in rows if row["level"] == level]
@@ -182,7 +202,7 @@ def frames(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _gap(rows: Sequence[Row]) -> str:
-    """Median and largest gap in millimeters, and how many paths were not made."""
+    """Return median and largest gap [mm] in words, and how many paths were not made."""
     found = [1e3 * value for value in values_of(rows, "gap")]
     if not rows:
         return ""

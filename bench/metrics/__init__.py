@@ -1,1 +1,1 @@
-"""What is measured of an episode."""
+"""Metrics of an episode."""

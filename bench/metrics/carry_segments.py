@@ -1,4 +1,4 @@
-"""When an object was carried, and how level it was kept: from the simulator's contacts and poses alone."""
+"""Carries of an episode and the tilt of the carried object, from the simulator's contacts and poses alone."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ...envs.pour.rules import ARRIVED
 from .trace import Trace
 
 LIFTED = 0.02
-"""Height [m] above where it was grasped from which on an object is carried."""
+"""Height [m] above its pose at the grasp from which an object counts as carried."""
 FLICKER = 0.2
-"""A grasp whose contacts are away for no longer than this [s] goes on."""
+"""Longest loss of contact [s] that does not end a grasp."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,8 +24,9 @@ class Carry:
         arm: index of the hand.
         object: index of the object.
         first: tick of the grasp.
-        last: tick of the release, or of the end.
-        aloft: (last - first + 1,) ticks in which it is carried: lifted, and not yet where it is poured from.
+        last: tick of the release, or the last tick.
+        aloft: (last - first + 1,) True at ticks in which the object is carried: lifted, and not yet at the pouring
+            place.
     """
 
     arm: int
@@ -36,11 +37,11 @@ class Carry:
 
 
 def carries(trace: Trace, poured_into: int | None = None) -> list[Carry]:
-    """All carries of an episode, in order of their grasps; a grasp that lifts nothing is none.
+    """Return all carries of an episode, in order of their grasps; grasps without a lift are skipped.
 
     Args:
         trace: the episode.
-        poured_into: index of the glass that the other one is poured into: carrying ends near it.
+        poured_into: index of the target glass: carrying ends near it; None if nothing is poured.
     """
     found = []
     for arm in range(trace.held.shape[1]):
@@ -51,7 +52,7 @@ def carries(trace: Trace, poured_into: int | None = None) -> list[Carry]:
 
 
 def _runs(held: np.ndarray, dt: float) -> list[tuple[int, int]]:
-    """First and last tick of every run of True, short gaps closed."""
+    """Return first and last tick of every run of True, with short gaps closed."""
     ticks = np.flatnonzero(held)
     if not len(ticks):
         return []
@@ -61,7 +62,7 @@ def _runs(held: np.ndarray, dt: float) -> list[tuple[int, int]]:
 
 def _carry(trace: Trace, arm: int, k: int, first: int, last: int, poured_into: int | None) -> Carry:
     poses = trace.objects[first : last + 1, k]
-    # what is in the hand from the start has no support to be lifted from
+    # an object held from the start has no support to be lifted from
     aloft = np.ones(len(poses), dtype=bool) if first == 0 else poses[:, 2] > poses[0, 2] + LIFTED
     if poured_into is not None:
         rim = poses[:, :2] + 0.5 * GLASSES[k].height * axes(poses)[:, :2]
@@ -71,19 +72,27 @@ def _carry(trace: Trace, arm: int, k: int, first: int, last: int, poured_into: i
 
 
 def axes(poses: np.ndarray) -> np.ndarray:
-    """Third axes (n, 3) of poses (n, 7)."""
+    """Return the z axes (n, 3) of poses (n, 7)."""
     _, _, _, w, x, y, z = poses.T
     return np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
 def tilts(poses: np.ndarray) -> np.ndarray:
-    """Angles (n,) between the z axes of poses (n, 7) and the vertical [rad]."""
+    """Return the angles (n,) between the z axes of poses (n, 7) and the vertical [rad]."""
     up = axes(poses)
     return np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2])
 
 
 def carrying_tilt(trace: Trace, found: list[Carry]) -> tuple[float | None, float | None]:
-    """Largest tilt [rad] of what was carried, and its integral over the time of carrying [rad s]; None: no carry."""
+    """Return the tilt of the carried objects.
+
+    Args:
+        trace: the episode.
+        found: its carries.
+
+    Returns:
+        Largest tilt [rad] and integral of the tilt over the carrying time [rad s]; None without a carry.
+    """
     if not found:
         return None, None
     parts = [tilts(trace.objects[c.first : c.last + 1, c.object])[c.aloft] for c in found]

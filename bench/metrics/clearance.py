@@ -1,8 +1,8 @@
-"""How near robot and held object came to obstacles, judged by python-fcl on the robot's real collision geometry.
+"""Clearance of robot and held object from obstacles, judged by python-fcl on the robot's real collision geometry.
 
-Not in the paper: a judge of all methods must be none of theirs. Nothing here knows the planner's capsules or its
-distance queries, nor the simulator's (`envs/simulation/obstacle_distance.py`): what is read is the compiled model's
-collision geoms, and where the measured joints put them.
+Not in the paper: the judge of all methods must share no code with any of them. This module uses neither the planner's
+capsules and distance queries nor the simulator's (`envs/simulation/obstacle_distance.py`), only the compiled model's
+collision geoms, placed by the measured joints.
 """
 
 from __future__ import annotations
@@ -16,22 +16,23 @@ import numpy as np
 
 from ...envs.scene.scene import FIRST_OBJECT
 from ...envs.simulation.obstacle_distance import ROBOT
-from ...planner.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere, core_of
+from ...planner import Box, Capsule, Cylinder, Shape, Sphere
+from ...planner.geometry.shapes import core_of
 from ...planner.judge.geometry import UNIT, fcl_convex, fcl_geometry
 from .trace import Trace, geom_poses
 
 SOLID = mujoco.mjtGeom
 AT_ONCE = 4000
-"""Pairs of a geom and an obstacle that are sorted at once."""
+"""Number of pairs of a geom and an obstacle sorted per batch."""
 
 
 class Clearance(NamedTuple):
-    """Smallest distances of an episode [m], 0 where there was contact; None where there was nothing to measure.
+    """Smallest distances of an episode [m]: 0 at contact, None if there was nothing to measure.
 
     Attributes:
-        robot: of any link, hand or finger to an obstacle.
-        held: of what the fingers held.
-        second: when the smaller of the two was reached [s].
+        robot: distance of any link, hand or finger to an obstacle.
+        held: distance of the held object to an obstacle.
+        second: time at which the smaller distance was reached [s].
     """
 
     robot: float | None
@@ -40,12 +41,12 @@ class Clearance(NamedTuple):
 
     @property
     def smallest(self) -> float | None:
-        """The smaller of the two."""
+        """The smaller of the two distances [m]."""
         return min((value for value in (self.robot, self.held) if value is not None), default=None)
 
 
 class Solids:
-    """The collision geoms of a simulation's robot and objects in fcl; made once, used for many episodes."""
+    """The collision geoms of a simulation's robot and objects in fcl; built once for many episodes."""
 
     def __init__(self, sim: Any):
         model, owner = sim.model, sim.scene.owner
@@ -53,13 +54,13 @@ class Solids:
         known = np.isin(owner, ROBOT) | ((owner >= FIRST_OBJECT) & (owner < FIRST_OBJECT + len(sim.scene.objects)))
         self.geoms = np.flatnonzero(solid & known & (model.geom_type != SOLID.mjGEOM_PLANE))
         self.owner = np.maximum(owner[self.geoms] - FIRST_OBJECT, -1)
-        """(g,) index of the object that a geom belongs to, -1: the robot's."""
+        """(g,) index of the object that owns the geom; -1: the robot."""
         self.middle, self.half = model.geom_aabb[self.geoms, :3], model.geom_aabb[self.geoms, 3:]
         self.bodies = [fcl.CollisionObject(_geometry(model, int(geom))) for geom in self.geoms]
         self._sim = proxy(sim)
 
     def clearance(self, trace: Trace) -> Clearance:
-        """The smallest distances of an episode."""
+        """Return the smallest distances of an episode."""
         ticks = np.flatnonzero(trace.active.any(axis=1))
         if not len(ticks):
             return Clearance(None, None, None)
@@ -74,7 +75,7 @@ class Solids:
     def _nearest(
         self, trace: Trace, ticks: np.ndarray, places: np.ndarray, turns: np.ndarray, wanted: np.ndarray
     ) -> tuple[float | None, int | None]:
-        """Smallest distance [m] over ticks and geoms (t, g) and its tick: best first, by lower bounds."""
+        """Return the smallest distance [m] over ticks and geoms (t, g) and its tick, by best-first search."""
         slots = np.flatnonzero(trace.kinds > 0)
         bounds = np.stack([self._at_least(trace, ticks, places, turns, slot) for slot in slots], axis=-1)
         bounds[~(wanted[:, :, None] & trace.active[ticks][:, None, slots])] = np.inf
@@ -100,14 +101,14 @@ class Solids:
     def _at_least(
         self, trace: Trace, ticks: np.ndarray, places: np.ndarray, turns: np.ndarray, slot: int
     ) -> np.ndarray:
-        """(t, g) lower bounds [m]: from the middle of the obstacle to a box about the geom, less a ball about it."""
+        """Return lower bounds (t, g) [m]: obstacle's center to the geom's box, minus the obstacle's bounding radius."""
         away = trace.obstacles[ticks, slot, None, :3] - places
         beyond = np.abs(np.einsum("tgij,tgi->tgj", turns, away) - self.middle) - self.half
         return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) - core_of(trace.shape(slot))[3]
 
 
 def solids_of(sim: Any) -> Solids:
-    """The solids of a simulation, made at the first call."""
+    """Return the solids of a simulation, built at the first call."""
     if sim not in _MADE:
         _MADE[sim] = Solids(sim)
     return _MADE[sim]
@@ -121,7 +122,7 @@ def _obstacle(shape: Shape) -> Any:
 
 
 def _geometry(model: mujoco.MjModel, geom: int) -> Any:
-    """A geom in fcl; of a mesh its convex hull, which is what MuJoCo collides with."""
+    """Return a geom in fcl; a mesh becomes its convex hull, as in MuJoCo's collision checks."""
     kind, (x, y, z) = int(model.geom_type[geom]), (float(size) for size in model.geom_size[geom])
     if kind == SOLID.mjGEOM_MESH:
         first, count = (int(table[model.geom_dataid[geom]]) for table in (model.mesh_vertadr, model.mesh_vertnum))

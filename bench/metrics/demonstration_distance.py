@@ -1,4 +1,4 @@
-"""What was done, beside what was shown: lengths of the way, and how far the motion strays from the demonstration's."""
+"""Comparison with the demonstration: path lengths, and deviation of the motion from the demonstrated motion."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...configs.shipped_files import demonstration_path
-from ...planner.geometry.pose import PosePath
-from ...planner.imitation.demonstration import Demonstration
-from ...planner.imitation.demonstration_files import load_demonstration
+from ...configs import load_demonstration
+from ...planner import Demonstration, PosePath
 from ...planner.imitation.segmentation import resampled, trimmed
 from ...planner.judge.deviation import frechet, screw_gaps
 from ..task_table import TASKS
@@ -18,21 +16,23 @@ from .carry_segments import Carry, tilts
 from .trace import Trace
 
 SPACING = 0.004
-"""Screw length between the compared poses [m]: less than this tells nothing."""
+"""Path length (weighted) between the compared poses [m]: finer spacing changes nothing."""
 KEPT = 0.5
-"""Share of the demonstrated segment, from its end, that counts: before it an imitation comes from wherever it was."""
+"""Share of the demonstrated segment, from its end, that is compared: before it, an imitated path still leads in from
+its own start."""
 FUMBLING = 0.02
-"""Distance [m] to the segment's end at which its tail is replaced by a straight way, because people fumble there."""
+"""Distance [m] from the segment's end within which its tail is replaced by a straight line, because people fumble
+there."""
 MOST = 500
-"""Poses of a motion that are compared."""
+"""Largest number of compared poses per motion."""
 
 
 class DemonstrationShape(NamedTuple):
-    """What of a demonstration the carries of an episode are compared with.
+    """The part of a demonstration that carries are compared with.
 
     Attributes:
-        length: of the tcp's way from the grasp to the end of the kept segment [m].
-        tail: (k, 4, 4) poses of the kept segment from `KEPT` on, relative to its end.
+        length: length of the tcp's path from the grasp to the end of the compared segment [m].
+        tail: (k, 4, 4) poses of the last `KEPT` of the compared segment, relative to its end.
     """
 
     length: float
@@ -41,13 +41,18 @@ class DemonstrationShape(NamedTuple):
 
 @lru_cache(maxsize=16)
 def demonstration_named(name: str) -> Demonstration | None:
-    """A shipped demonstration or that of a file; None of an empty name."""
-    return load_demonstration(demonstration_path(name)) if name else None
+    """Return a demonstration by shipped name or file path; None for an empty name."""
+    return load_demonstration(name) if name else None
 
 
 @lru_cache(maxsize=16)
 def shown(demonstration: Demonstration | None, task: str) -> DemonstrationShape | None:
-    """The demonstrated carry of a task; None where the demonstration has none to compare with."""
+    """Return the demonstrated carry of a task; None if the demonstration lacks the compared segment.
+
+    Args:
+        demonstration: the demonstration; None: no demonstration.
+        task: name of the task.
+    """
     compared_segment = TASKS[task].compared_segment
     segments = {} if demonstration is None else {segment.name: segment for segment in demonstration.segments}
     if demonstration is None or compared_segment not in segments:
@@ -61,34 +66,57 @@ def shown(demonstration: Demonstration | None, task: str) -> DemonstrationShape 
 
 
 def length_of(points: np.ndarray) -> float:
-    """Length [m] of the way through points (n, 3)."""
+    """Return the length [m] of the polyline through points (n, 3)."""
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 def turning_of(quaternions: np.ndarray) -> float:
-    """Sum of the angles [rad] between unit quaternions (n, 4) that follow each other."""
+    """Return the sum of the angles [rad] between successive unit quaternions (n, 4)."""
     a, b = quaternions[:-1], quaternions[1:]
     b = np.where((a * b).sum(axis=1, keepdims=True) < 0.0, -b, b)
     return float((4.0 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))).sum())
 
 
 def end_of(trace: Trace, carry: Carry, *, poured: bool) -> int:
-    """The tick that a carry leads to: the release, or what tilts a poured glass the most."""
+    """Return the tick at which a carry reaches its goal: the release, or the largest tilt of a poured glass.
+
+    Args:
+        trace: the episode.
+        carry: the carry.
+        poured: True if the task pours.
+    """
     if not poured:
         return carry.last
     return carry.first + int(np.argmax(tilts(trace.objects[carry.first : carry.last + 1, carry.object])))
 
 
 def way_ratio(trace: Trace, carry: Carry, end: int, wanted: DemonstrationShape) -> float:
-    """Length of the tcp's way from the grasp to the carry's end over the demonstration's."""
+    """Return the length of the tcp's path from the grasp to the carry's end, divided by the demonstration's.
+
+    Args:
+        trace: the episode.
+        carry: the carry.
+        end: tick of the carry's end, see `end_of`.
+        wanted: the demonstrated carry.
+    """
     return length_of(trace.tcp[carry.first : end + 1, carry.arm, :3]) / wanted.length
 
 
 def deviation(trace: Trace, carry: Carry, end: int, wanted: DemonstrationShape) -> float | None:
-    """Frechet distance [m] of the carry's end to the demonstration moved rigidly to where the carry ended.
+    """Return the Frechet distance [m] of the carry's final part to the demonstration moved rigidly to the carry's end.
 
-    "Method-aligned": a method that imitates by moving the demonstration rigidly has about zero by construction, so
-    this says whether it does what it means to, not whether that is good. Angles count 0.2 m per radian.
+    "Method-aligned": for a method that imitates by moving the demonstration rigidly the deviation is about zero by
+    construction, so it tells whether the method does what it intends, not whether that is good. Angles count 0.2 m per
+    radian.
+
+    Args:
+        trace: the episode.
+        carry: the carry.
+        end: tick of the carry's end, see `end_of`.
+        wanted: the demonstrated carry.
+
+    Returns:
+        The deviation; None for a motion that is too short.
     """
     poses = trace.tcp[carry.first : end + 1, carry.arm]
     if len(poses) < 2:

@@ -1,4 +1,4 @@
-"""What the metrics of an episode mean, and how a table or a figure prints them."""
+"""Metrics of an episode: meaning, and format in tables and figures."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ class Metric:
     """One metric.
 
     Attributes:
-        words: what it is called in tables.
-        unit: in which it is printed, "" for a pure number.
-        factor: from the recorded number to that unit.
-        better: "less", "more", or "" where neither is better.
-        successes: it says something of successes only.
-        paired: methods are compared by it, scenario by scenario.
-        meaning: one sentence for the reader.
+        words: name in tables.
+        unit: unit in tables; "" for a pure number.
+        factor: conversion factor from the recorded number to that unit.
+        better: "less", "more", or "" if neither is better.
+        successes: True if the metric is meaningful for successes only.
+        paired: True if methods are compared by it, scenario by scenario.
+        meaning: definition in one sentence.
     """
 
     words: str
@@ -29,7 +29,7 @@ class Metric:
 
     @property
     def title(self) -> str:
-        """Words and unit."""
+        """Name and unit."""
         return f"{self.words} [{self.unit}]" if self.unit else self.words
 
 
@@ -78,4 +78,4 @@ METRICS = {
         "a method that imitates by moving the demonstration, so no measure of merit",
     ),
 }  # fmt: skip
-"""In the order of tables."""
+"""All metrics by name, in the order of tables."""

@@ -1,4 +1,4 @@
-"""The numbers of an episode, from its trace and from what the simulator said at its end; see `metric_table`."""
+"""Metrics of an episode, from its trace and the simulator's final `info`; see `metric_table`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ...planner.imitation.demonstration import Demonstration
+from ...planner import Demonstration
 from ..task_table import TASKS
 from .carry_segments import Carry, carries, carrying_tilt
 from .clearance import Solids
@@ -16,8 +16,9 @@ from .smoothness import log_dimensionless_jerk, sparc
 from .trace import Trace
 
 MOVED = 1e-3
-"""Change of a joint [rad] from which on the arm has begun to move."""
+"""Change of a joint [rad] from which the arm counts as moving."""
 Metrics = dict[str, float | None]
+"""Values by name, see `metric_table`; None if there was nothing to measure."""
 
 
 def metrics_of(
@@ -29,15 +30,15 @@ def metrics_of(
     *,
     success: bool,
 ) -> Metrics:
-    """All metrics of an episode, the same whoever computes them: no time of the clock is among them.
+    """Return all metrics of an episode; none depends on real time, so that they are reproducible.
 
     Args:
         trace: the episode.
         solids: collision geometry of its simulation.
         task: name of the task.
-        numbers: the task's own, as in `info` at the end.
-        demonstration: what the carries are compared with; None: nothing.
-        success: as the simulator judged.
+        numbers: the task's own numbers, as in the final `info`.
+        demonstration: demonstration that the carries are compared with; None: no comparison.
+        success: verdict of the simulator.
     """
     facts, near = TASKS[task], solids.clearance(trace)
     found = carries(trace, facts.poured_into)
@@ -63,14 +64,14 @@ def metrics_of(
 
 
 def first_motion(trace: Trace) -> float | None:
-    """Simulated time [s] at which the first joint has moved; None: none did."""
+    """Return the simulated time [s] at which the first joint has moved; None if none has."""
     joints = trace.joints[:, trace.columns.ravel()]
     moved = np.flatnonzero((np.abs(joints - joints[0]) > MOVED).any(axis=1))
     return float(trace.time[moved[0]]) if len(moved) else None
 
 
 def _of_carries(trace: Trace, found: list[Carry], task: str, demonstration: Demonstration | None) -> Metrics:
-    """Means over the carries of an episode; of the deviation the largest."""
+    """Return means over the carries of an episode; for the deviation the maximum."""
     facts, wanted = TASKS[task], shown(demonstration, task)
     ends = [end_of(trace, carry, poured=facts.poured_into is not None) for carry in found]
     pairs = list(zip(found, ends, strict=True))
@@ -88,7 +89,7 @@ def _of_carries(trace: Trace, found: list[Carry], task: str, demonstration: Demo
 
 
 def _speed(trace: Trace, carry: Carry, end: int) -> np.ndarray:
-    """Speed of the tcp between ticks [m/s]."""
+    """Return the speed of the tcp between ticks [m/s]."""
     points = trace.tcp[carry.first : end + 1, carry.arm, :3]
     return np.linalg.norm(np.diff(points, axis=0), axis=1) / trace.dt if len(points) > 1 else np.zeros(0)
 

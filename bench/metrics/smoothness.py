@@ -1,4 +1,4 @@
-"""How smooth a movement was, by two published measures of its speed; both are larger (less negative) for smoother ones.
+"""Smoothness of a movement by two published measures of its speed; both are larger (less negative) if it is smoother.
 
 Not in the paper: S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet, On the analysis of movement
 smoothness, Journal of NeuroEngineering and Rehabilitation 12:112, 2015.
@@ -9,21 +9,21 @@ from __future__ import annotations
 import numpy as np
 
 CUTOFF = 10.0
-"""Highest frequency that counts for `sparc` [Hz]."""
+"""Highest frequency considered by `sparc` [Hz]."""
 THRESHOLD = 0.05
-"""Share of the spectrum's peak below which its tail does not count."""
+"""Share of the spectrum's peak below which its tail is cut off."""
 PADDING = 4
-"""The spectrum is made of 2 to this power times as many samples as the movement has, rounded up to a power of 2."""
+"""Zero padding of the spectrum: 2 to this power times the number of samples, itself rounded up to a power of 2."""
 FEWEST = 5
-"""Samples of the shortest movement that is judged."""
+"""Fewest samples of a movement that is measured."""
 
 
 def log_dimensionless_jerk(speed: np.ndarray, rate: float) -> float | None:
-    """`-ln(T^3 / v_max^2 * integral of (d2v/dt2)^2 dt)`; None of too short a movement and of none at all.
+    """Return `-ln(T^3 / v_max^2 * integral of (d2v/dt2)^2 dt)`; None if the movement is too short or at rest.
 
     Args:
-        speed: (n,) of one movement, from rest to rest [m/s].
-        rate: samples per second [Hz].
+        speed: (n,) speed of one movement, from rest to rest [m/s].
+        rate: sampling rate [Hz].
     """
     peak = float(np.abs(speed).max(initial=0.0))
     if len(speed) < FEWEST or peak == 0.0:
@@ -34,7 +34,12 @@ def log_dimensionless_jerk(speed: np.ndarray, rate: float) -> float | None:
 
 
 def sparc(speed: np.ndarray, rate: float) -> float | None:
-    """Spectral arc length of a speed (n,) at a rate [Hz]; None of too short a movement and of none at all."""
+    """Return the spectral arc length of a movement's speed; None if the movement is too short or at rest.
+
+    Args:
+        speed: (n,) speed of one movement, from rest to rest [m/s].
+        rate: sampling rate [Hz].
+    """
     if len(speed) < FEWEST or not np.abs(speed).max() > 0.0:
         return None
     count = 2 ** (int(np.ceil(np.log2(len(speed)))) + PADDING)

@@ -1,4 +1,4 @@
-"""What the simulator says at every control tick of an episode: the raw material of all metrics."""
+"""Measurements of the simulator at every control tick of an episode: the raw material of all metrics."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import mujoco
 import numpy as np
 
 from ...envs.simulation.moving_obstacles import KINDS, described
-from ...planner.geometry.shapes import Box, Capsule, Shape, Sphere
+from ...planner import Box, Capsule, Shape, Sphere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """An episode as it was, n control ticks, the start included.
+    """Measurements of an episode at n control ticks, including the start.
 
     Attributes:
-        time: (n,) [s].
-        joints: (n, m) measured positions of all the robot's joints, fingers and parked arms included [rad, m].
-        columns: (n_arms, dof) which of `joints` belong to the arms that work.
-        tcp: (n, n_arms, 7) the tools in the world, x y z [m] and wxyz.
-        objects: (n, n_objects, 7) the objects in the world.
-        held: (n, n_arms, n_objects) what the fingers touch, by the simulator's contacts.
-        active: (n, n_obstacles) which obstacles are there.
-        obstacles: (n, n_obstacles, 7) where they are in the world, wherever they wait included.
-        kinds: (n_obstacles,) code of each obstacle's shape, see `envs.obstacles.KINDS`; 0: none in this episode.
-        sizes: (n_obstacles, 3) its size [m], as observed.
+        time: (n,) simulated time [s].
+        joints: (n, m) measured positions of all the robot's joints, including fingers and parked arms [rad, m].
+        columns: (n_arms, dof) columns of `joints` that belong to the working arms.
+        tcp: (n, n_arms, 7) tool poses in the world, x y z [m] and wxyz.
+        objects: (n, n_objects, 7) object poses in the world.
+        held: (n, n_arms, n_objects) True if the fingers touch the object, by the simulator's contacts.
+        active: (n, n_obstacles) True if the obstacle is present.
+        obstacles: (n, n_obstacles, 7) obstacle poses in the world, also of obstacles that are parked.
+        kinds: (n_obstacles,) shape code, see `envs.simulation.moving_obstacles.KINDS`; 0: not used in this episode.
+        sizes: (n_obstacles, 3) size [m], as observed.
     """
 
     time: np.ndarray
@@ -43,17 +43,17 @@ class Trace:
 
     @property
     def dt(self) -> float:
-        """Seconds between ticks; 0 of a trace of one."""
+        """Time between ticks [s]; 0 for a trace of one tick."""
         return float(self.time[1] - self.time[0]) if len(self.time) > 1 else 0.0
 
     def shape(self, slot: int) -> Shape:
-        """The shape of an obstacle of this episode."""
+        """Return the shape of an obstacle of this episode."""
         x, y, z = (float(value) for value in self.sizes[slot])
         kind = {code: shape for shape, code in KINDS.items()}[float(self.kinds[slot])]
         return Box((x, y, z)) if kind is Box else Capsule(x, z) if kind is Capsule else Sphere(x)
 
     def save(self, path: Path) -> None:
-        """Write it as a compressed .npz: numbers as float32, flags as they are."""
+        """Write the trace as a compressed .npz: numbers as float32, flags unchanged."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         small = {key: a.astype(np.float32) if a.dtype == np.float64 else a for key, a in arrays.items()}
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -61,21 +61,21 @@ class Trace:
 
     @staticmethod
     def load(path: Path) -> Trace:
-        """A trace that was saved."""
+        """Return a saved trace."""
         with np.load(path, allow_pickle=False) as file:
             arrays = {field.name: file[field.name] for field in fields(Trace)}
         return Trace(**{key: a.astype(np.float64) if a.dtype == np.float32 else a for key, a in arrays.items()})
 
 
 def robot_addresses(sim: Any) -> np.ndarray:
-    """Addresses in `qpos` of all joints that belong to no object and no bead, in order."""
+    """Return the addresses in `qpos` of all joints that belong neither to an object nor to a bead, in order."""
     places = sim.model.jnt_qposadr[sim.model.body_jntadr[sim.scene.objects]]
     free = (places[:, None] + np.arange(7)).ravel()
     return np.setdiff1d(np.arange(sim.model.nq), np.concatenate([free, sim.scene.beads.ravel()]))
 
 
 class TraceRecorder:
-    """Takes down an episode; call it with the environment and its observation at the start and after each step."""
+    """Recorder of an episode; call it with the environment and its observation at the start and after each step."""
 
     def __init__(self, env: Any):
         base = env.unwrapped
@@ -87,7 +87,7 @@ class TraceRecorder:
         self._rows: list[tuple[np.ndarray, ...]] = []
 
     def __call__(self, env: Any, observation: Any) -> None:
-        """Take down the present state."""
+        """Record the current state."""
         sim = self._sim
         state, data = sim.read(), sim.data
         places = np.hstack([data.mocap_pos[self._mocap], data.mocap_quat[self._mocap]])
@@ -95,7 +95,7 @@ class TraceRecorder:
         self._rows.append((*row, sim.obstacles.active.copy(), places))
 
     def trace(self) -> Trace:
-        """What was taken down."""
+        """Return the recorded trace."""
         joints, tcp, objects, held, active, places = (np.array(column) for column in zip(*self._rows, strict=True))
         kinds, sizes = np.zeros(active.shape[1]), np.zeros((active.shape[1], 3))
         for slot, each in enumerate(self._sim.obstacles.scheduled_obstacles):
@@ -105,9 +105,18 @@ class TraceRecorder:
 
 
 def geom_poses(sim: Any, trace: Trace, ticks: np.ndarray, geoms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (t, g, 3) [m] and rotations (t, g, 3, 3) of geoms at some ticks, by MuJoCo's forward kinematics.
+    """Return the poses of geoms at some ticks, by MuJoCo's forward kinematics.
 
-    The scene that is being simulated is not touched.
+    The running simulation is not touched.
+
+    Args:
+        sim: the simulation.
+        trace: the episode.
+        ticks: (t,) indices of ticks.
+        geoms: (g,) indices of geoms.
+
+    Returns:
+        Positions (t, g, 3) [m] and rotation matrices (t, g, 3, 3).
     """
     model, data = sim.model, mujoco.MjData(sim.model)
     robot = robot_addresses(sim)

@@ -1,1 +1,1 @@
-"""`onedemo perf`: speeds as ratios."""
+"""`onedemo perf`: speed measurements as ratios."""

@@ -35,10 +35,9 @@ HELP = "onedemo --help"
 
 
 def _panda() -> tuple[Any, np.ndarray, np.ndarray]:
-    """The workspace of the Panda's controller, joints, and a target (8,) in reach."""
+    """Return the arrays of the Panda's controller, joints (7,) [rad], and a reachable target (8,)."""
+    from ...planner import Arm, ControllerSettings
     from ...planner.control.arm_arrays import arm_arrays
-    from ...planner.control.controller import ControllerSettings
-    from ...planner.robot.arm import Arm
 
     arm = Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8")
     return arm_arrays(arm, ControllerSettings(law="paper").packed()), READY, np.array(arm.fk(READY + 0.1).dq)
@@ -103,12 +102,9 @@ print(time.perf_counter() - start if "robosuite" not in sys.modules else float("
 _START = """
 import time
 start = time.perf_counter()
-import gymnasium, onedemo.envs
-from onedemo.baselines.factory import make_policy
-from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+import gymnasium, onedemo, onedemo.envs
 env = gymnasium.make("onedemo/Stack-v0")
-policy = make_policy("screw", env.unwrapped.task, load_demonstration(shipped_demonstration("stack")), {})
+policy = onedemo.make_policy("screw", env.unwrapped.task, onedemo.load_demonstration("stack"))
 observation, _ = env.reset(seed=0)
 action, _ = policy.predict(observation)
 assert abs(action[:-1]).max() > 0
@@ -141,7 +137,7 @@ def _help() -> Row:
 
 
 def _measured(code: str) -> float:
-    """The number that a Python program prints last."""
+    """Return the number that a Python program prints last."""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return float(done.stdout.split()[-1])
 
@@ -156,14 +152,14 @@ GROUPS: dict[str, Lines] = {
     "report": REPORT_LINES,
     "learning": LEARNING_LINES,
 }
-"""Per group its lines: what is measured, and how."""
+"""Measurements by group and name."""
 
 
 def matching(pattern: str) -> Lines:
-    """The lines whose group or name matches a shell pattern, or whose name contains it; nothing is measured yet.
+    """Return the measurements whose group or name matches a shell pattern, or whose name contains it; measure nothing.
 
     Raises:
-        UnknownName: there are none; the message lists groups and lines.
+        UnknownName: no measurement matches; the message lists groups and names.
     """
     found = {
         name: measure
@@ -178,16 +174,28 @@ def matching(pattern: str) -> Lines:
 
 
 def write_json(rows: list[Row], path: Path) -> None:
-    """The lines as `{"rows": [...]}`."""
+    """Write the rows as `{"rows": [...]}`.
+
+    Args:
+        rows: measured rows.
+        path: the file.
+    """
     path.write_text(json.dumps({"rows": [asdict(line) for line in rows]}, indent=2) + "\n", encoding="utf-8")
 
 
 def run_perf(pattern: str, json_file: Path | None) -> int:
-    """Measure and print a table; exit code 1 if a bar is missed.
+    """Measure and print a table.
+
+    Args:
+        pattern: shell pattern of groups or names; see `matching`.
+        json_file: file for the rows, or None.
+
+    Returns:
+        The exit code: 1 if a row misses its limit.
 
     Raises:
-        UnknownName: nothing matches the pattern.
-        BadConfig: the file cannot be written, which is found before anything is measured.
+        UnknownName: no measurement matches the pattern.
+        BadConfig: the file cannot be written, which is checked before anything is measured.
     """
     wanted = matching(pattern)
     if json_file:

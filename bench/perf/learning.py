@@ -1,4 +1,4 @@
-"""How much of a learner's time its environment takes: the same learner on one that does nothing."""
+"""Share of a learner's time that its environment takes, measured against the same learner on an idle environment."""
 
 from __future__ import annotations
 
@@ -8,33 +8,37 @@ from typing import Any
 
 import gymnasium as gym
 
-from ...configs.train_config import TrainConfig
+from ...baselines.errors import MissingExtra
+from ...configs import TrainConfig
 from ...envs.core.single_motion import HORIZON
-from ...planner.errors import MissingExtra
 from ..task_table import TASKS
 from .measuring import Row, row, seconds_per_call
 
 SHARE = 0.85
-"""Of the throughput without an environment."""
+"""Required share of the throughput on an idle environment."""
 LEARNERS: dict[str, dict[str, Any]] = {"our SAC": {}, "SB3's SAC": {"hidden": [256, 256], "batch_size": 256}}
-"""Networks and batches: our defaults, made for one core, and the library's own."""
+"""Networks and batches: this project's defaults, made for one core, and the library's own."""
 
 
 class Idle(gym.Env):
-    """An environment that does nothing, with the spaces and the episodes of another."""
+    """Environment that does nothing, with the spaces and the episode length of another one.
+
+    Args:
+        like: environment that gives the spaces.
+    """
 
     def __init__(self, like: Any):
         self.observation_space, self.action_space = like.observation_space, like.action_space
         self._seen, self._steps = like.observation_space.sample(), 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Its one observation."""
+        """See `gymnasium.Env`."""
         super().reset(seed=seed)
         self._steps = 0
         return self._seen, {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """The same observation."""
+        """See `gymnasium.Env`; the observation never changes."""
         self._steps += 1
         return self._seen, 0.0, False, self._steps >= HORIZON, {}
 
@@ -73,4 +77,4 @@ LEARNING_LINES: dict[str, Callable[[], Row]] = {
     for task in ("reach", "place_one")
     for learner in LEARNERS
 }
-"""Name of a line: what measures it."""
+"""Measurements by name."""

@@ -1,4 +1,4 @@
-"""How speeds are measured: lines of a table, and timing that noise hits evenly."""
+"""Measurement of speeds: rows of the table, and timing that exposes all functions to the same noise."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 BATCHES = 15
+"""Number of batches per function."""
 BATCH_SECONDS = 0.02
+"""Approximate duration [s] of a batch."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One measured line.
+    """Row of the table of measurements.
 
     Attributes:
         name: what is measured.
-        value: the figure; None where it could not be measured.
-        unit: of the figure ("ratio", "us", "ms", "MB", "s").
-        goal: largest value that is well; None where there is no bar.
-        ok: the bar is met; None where there is none or nothing was measured.
-        note: what it was measured against, or why it was not.
+        value: measured value; None if it could not be measured.
+        unit: unit of the value ("ratio", "us", "ms", "MB", "s").
+        goal: largest value that passes; None if there is no limit.
+        ok: whether the row passes; None if there is no limit or no value.
+        note: reference of the measurement, or the reason why there is no value.
     """
 
     name: str
@@ -33,16 +35,24 @@ class Row:
 
 
 def row(name: str, value: float, unit: str, goal: float | None, note: str = "") -> Row:
-    """A measured line with its verdict."""
+    """Return a measured row with its verdict.
+
+    Args:
+        name: see `Row`.
+        value: see `Row`.
+        unit: see `Row`.
+        goal: see `Row`.
+        note: see `Row`.
+    """
     return Row(name, value, unit, goal, None if goal is None else value <= goal, note)
 
 
 def seconds_per_call(*functions: Callable[[], object], together: bool = False) -> list[float]:
-    """Median seconds per call of each function, their batches interleaved so that noise hits all alike.
+    """Return the median time [s] per call of each function; interleaved batches expose all functions to the same noise.
 
     Args:
-        functions: what is measured.
-        together: all are called equally often, for functions that go through the same states.
+        functions: functions to measure.
+        together: call all functions equally often, for functions that step through the same states.
     """
     counts = []
     for function in functions:
@@ -55,7 +65,7 @@ def seconds_per_call(*functions: Callable[[], object], together: bool = False) -
     samples: list[list[float]] = [[] for _ in functions]
     runs = list(zip(functions, counts, samples, strict=True))
     for batch in range(BATCHES):
-        # there and back, so that what disturbs at a steady beat does not always hit the same one
+        # alternating order, so that a periodic disturbance does not always hit the same function
         for function, count, sample in runs[:: -1 if batch % 2 else 1]:
             start = time.perf_counter()
             for _ in range(count):

@@ -1,6 +1,6 @@
-"""OMPL's RRT-Connect as it comes, on the same arm with the same distance queries, for `onedemo perf`.
+"""OMPL's RRT-Connect with default settings, on the same arm and distance queries, for `onedemo perf`.
 
-Edges are looked at in the steps that OMPL takes by itself; the policy `rrt` has them proven clear.
+Edges are checked at OMPL's default resolution; the policy `rrt` has them proven clear.
 """
 
 from __future__ import annotations
@@ -12,14 +12,20 @@ import numpy as np
 
 from ...baselines.extras import needed
 from ...baselines.motion.rrt_connect import informed, joint_space, state_of
-from ...planner.robot.arm import Arm
+from ...planner import Arm
 
 BUDGET = 2.0
-"""Seconds that it may search."""
+"""Time limit [s] of a search."""
 
 
 def ompl_solver(arm: Arm, g: np.ndarray, start: np.ndarray, goal: np.ndarray) -> Callable[[], object]:
-    """RRT-Connect from start to goal joints (dof,) among the obstacles of a work array.
+    """Return a call that plans once with RRT-Connect.
+
+    Args:
+        arm: the arm.
+        g: work array of the robot and its obstacles; see `robot_arrays`.
+        start: (dof,) joints [rad].
+        goal: (dof,) joints [rad].
 
     Raises:
         MissingExtra: OMPL is not installed.

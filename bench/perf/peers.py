@@ -1,4 +1,4 @@
-"""Other libraries doing the same work, for `onedemo perf`."""
+"""Other libraries that do the same work, for `onedemo perf`."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 READY = np.array([0.0, 0.2, 0.0, -2.6, 0.0, 2.9, 0.78])
-"""Joints of the Panda at which kinematics are measured."""
+"""Joints (7,) [rad] of the Panda at which kinematics are measured."""
 Call = Callable[[], object]
 
 
 def panda_urdf() -> Path:
-    """Path of the Panda description that robosuite ships, found without importing it."""
+    """Return the path of the Panda description that robosuite ships, without importing robosuite."""
     from importlib.util import find_spec
 
     spec = find_spec("robosuite")
@@ -24,7 +24,7 @@ def panda_urdf() -> Path:
 
 
 def pinocchio_kinematics(q: np.ndarray) -> Call:
-    """Pinocchio's Jacobian of the Panda's flange in its own axes, and its pose."""
+    """Return a call that computes the Jacobian of the Panda's flange in its own axes, and its pose, with Pinocchio."""
     import pinocchio as pin
 
     model = pin.buildModelFromUrdf(str(panda_urdf()))
@@ -39,7 +39,15 @@ def pinocchio_kinematics(q: np.ndarray) -> Call:
 
 
 def dq_robotics_tick(q: np.ndarray, target: np.ndarray) -> Call | None:
-    """The corrected paper law with DQ_Robotics' own algebra, pseudo-inverse and null space; None without it."""
+    """Return a call of the corrected paper law in DQ_Robotics' own algebra, with pseudo-inverse and null space.
+
+    Args:
+        q: (7,) joints [rad].
+        target: (8,) target pose of the flange.
+
+    Returns:
+        The call; None without DQ_Robotics.
+    """
     try:
         peer = import_module("dqrobotics")
         robots, algebra = import_module("dqrobotics.robots"), import_module("dqrobotics.utils.DQ_LinearAlgebra")

@@ -1,4 +1,4 @@
-"""The lines of `onedemo perf` about the planner: queries, trees, ticks, plans, and how their cost grows."""
+"""Measurements of the planner: distance queries, trees, control steps, plans, and the growth of their cost."""
 
 from __future__ import annotations
 
@@ -10,19 +10,23 @@ from typing import Any
 
 import numpy as np
 
+from ...envs.scene.robots import ROBOTS
 from ...planner.collision import clearance, proximity
+from ...planner.collision.capsule_placement import place_capsules
 from ...planner.collision.edge_certificates import tool_arrays
-from ...planner.collision.robot_arrays import WORLD, place_capsules, robot_arrays
+from ...planner.collision.robot_arrays import ROW, robot_arrays
 from ...planner.control.arm_arrays import arm_arrays
-from ...planner.escape import escape_tree
 from ...planner.escape.repet import RepetSettings, escape_path, point_tool
+from ...planner.escape.tree_arrays import NODE, OPTION
 from ...planner.geometry.pose import Pose, PosePath
 from ...planner.geometry.shapes import Box, Capsule, Obstacle, Shape, Sphere, pack
 from ...planner.jit import kernel
-from ...planner.planning.plan import Problem
-from ...planner.planning.planner import Planner, plan_batch
+from ...planner.planning.batch import plan_batch
+from ...planner.planning.plan import PlanRequest
+from ...planner.planning.planner import Planner
 from ...planner.planning.settings import PlanSettings
 from ...planner.robot.arm import Arm
+from ...planner.robot.body import BODY
 from ...planner.safety.guarded_pursuit import safe_tick
 from ...planner.safety.safety_layer import SafetySettings
 from ..plan.tree_times import expand_loop
@@ -31,24 +35,25 @@ from .ompl_peer import ompl_solver
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
 
 SWAY = 100
-"""Control steps in which the measured arm sways once, by 0.1 rad at every joint."""
+"""Control steps per sway of the measured arm, by 0.1 rad at every joint."""
 DOWN = np.array([0.0, 0.5, 0.5, 0.0]) * np.sqrt(2.0)
-"""Tool pointing down, as at the Panda's usual joints."""
+"""Unit quaternion of a tool that points down, as at the Panda's usual joints."""
 FAR = 1.5
-"""Largest distance [m] of obstacles that are known but not close."""
+"""Largest distance [m] of obstacles that are known but not near."""
 
 
 @cache
 def _panda() -> tuple[Any, Any, np.ndarray]:
+    """Return arm, body and usual joints (7,) [rad] of the Panda."""
     from ...envs.scene.robot_bodies import robot_body
     from ...envs.scene.scene import compiled_scene
 
-    scene = compiled_scene("Panda")
-    return scene.arms[0].arm, robot_body("Panda"), np.array(scene.home[0])
+    scene = compiled_scene(ROBOTS["Panda"])
+    return scene.arms[0].arm, robot_body(ROBOTS["Panda"]), np.array(scene.home[0])
 
 
 def _spread(count: int, shapes: list[Shape], seed: int = 0) -> list[Obstacle]:
-    """Obstacles all round the arm, none of them within the safety layer's shell."""
+    """Return obstacles all around the arm, none of them within the safety layer's shell."""
     rng = np.random.default_rng(seed)
     found = []
     for k in range(count):
@@ -74,7 +79,7 @@ def _query_loop(rows, vertices, segments, repeats):
 
 
 def _query(name: str, shape: Shape) -> Row:
-    """Distance of a capsule's core from a shape, in a compiled loop."""
+    """Measure the distance between a capsule's core and a shape, in a compiled loop."""
     rng = np.random.default_rng(0)
     segments = rng.uniform(-0.5, 0.5, (64, 6))
     segments[:, 3:] = segments[:, :3] + rng.uniform(-0.1, 0.1, (64, 3))
@@ -88,14 +93,14 @@ def _query(name: str, shape: Shape) -> Row:
 
 
 def _level(name: str, shape: Shape, goal: float) -> Row:
-    """A level of an escape tree: a plane and eight children with proven edges, in a compiled loop."""
+    """Measure a level of an escape tree: a plane and eight children with proven edges, in a compiled loop."""
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(5, 3))
     places = 0.25 * directions / np.linalg.norm(directions, axis=1)[:, None]
     obstacles = [Obstacle(shape, Pose.from_yaw(place, 0.3)) for place in places]
     g, options = tool_arrays(point_tool(0.02), pack(obstacles), margin=0.02), RepetSettings().packed()
-    options[escape_tree.WIDEST], options[escape_tree.RANDOM] = 0.02, 0.0  # the first tree has no random children
-    tree, cells, state = np.zeros((16, escape_tree.TREE_WIDTH)), np.full(64, -1.0), np.ones(1)
+    options[OPTION.largest_margin], options[OPTION.random] = 0.02, 0.0  # the first tree has no random children
+    tree, cells, state = np.zeros((16, NODE.width)), np.full(64, -1.0), np.ones(1)
     tree[0, 0], towards = 1.0, np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0, 0.0]])
     ours, pin = seconds_per_call(
         lambda: expand_loop(g, tree, towards, cells, options, state, 100), pinocchio_kinematics(READY)
@@ -106,7 +111,7 @@ def _level(name: str, shape: Shape, goal: float) -> Row:
 
 
 def _tick(count: int) -> Callable[[], object]:
-    """A control step from Python, the whole arm kept clear of so many obstacles, of an arm that sways."""
+    """Return a control step from Python of a swaying arm, kept clear of `count` obstacles as a whole."""
     arm, body, q = _panda()
     work = arm_arrays(arm, PlanSettings().motion.controller.packed())
     target, out, settings = np.array(arm.fk(q + 0.05).dq), np.empty(arm.dof), SafetySettings()
@@ -137,28 +142,28 @@ def _tick_slope(name: str) -> Row:
 
 
 def _slope(name: str, sizes: np.ndarray, seconds: list[float]) -> Row:
-    """How the cost grows from the last size but one to the last, against linear growth."""
+    """Compare the cost's growth between the last two sizes with linear growth."""
     growth = (seconds[-1] / seconds[-2]) / (sizes[-1] / sizes[-2])
     note = ", ".join(f"{n}: {s * 1e6:.3g} us" for n, s in zip(sizes, seconds, strict=True))
     return row(name, float(growth), "ratio", 1.3, f"1 is linear; {note}")
 
 
 def _whole_arm(name: str) -> Row:
-    """Eight link capsules against twenty obstacles, and MuJoCo's distance for each pair."""
+    """Measure eight link capsules against twenty obstacles, and MuJoCo's distance for each pair."""
     import mujoco
 
     arm, body, q = _panda()
-    rows = body.rows[[k for k, r in enumerate(body.rows) if r[0] >= 0][:8]]
+    rows = body.rows[[k for k, r in enumerate(body.rows) if r[BODY.frame] >= 0][:8]]
     eight = type(body)(rows, tuple(f"c{k}" for k in range(8)))
     obstacles = _spread(20, MIXED)
     g = robot_arrays((arm,), (eight,), pack(obstacles), settings=SafetySettings().packed(0.02))
-    place_capsules(g, q, WORLD)
-    model, data = _mujoco_twin(mujoco, g[WORLD : WORLD + 8], rows[:, 7], obstacles)
+    place_capsules(g, q, ROW.placed)
+    model, data = _mujoco_twin(mujoco, g[ROW.placed : ROW.placed + 8], rows[:, BODY.radius], obstacles)
 
     def theirs() -> float:
         return min(mujoco.mj_geomDistance(model, data, i, 8 + k, 10.0, None) for i in range(8) for k in range(20))
 
-    ours, peer = seconds_per_call(lambda: clearance.min_slack(g, WORLD, 0.0, 10.0), theirs)
+    ours, peer = seconds_per_call(lambda: clearance.min_slack(g, ROW.placed, 0.0, 10.0), theirs)
     note = f"{ours * 1e6:.2f} us against {peer * 1e6:.0f} us for 160 pairs"
     return row(name, ours / peer, "ratio", 0.1, note)
 
@@ -184,7 +189,7 @@ def _mujoco_twin(mujoco: Any, world: np.ndarray, radii: np.ndarray, obstacles: l
 
 
 def _demo(count: int) -> PosePath:
-    """A lift, a carry and a descent of so many poses."""
+    """Return a demonstration of `count` poses: a lift, a carry and a descent."""
     s = np.linspace(0.0, 1.0, count)
     height = 0.1 * np.minimum(1.0, 4.0 * np.minimum(s, 1.0 - s))
     vectors = np.column_stack([0.4 * s - 0.2, 0.3 * s - 0.15, 0.95 + height, np.tile(DOWN, (count, 1))])
@@ -192,7 +197,8 @@ def _demo(count: int) -> PosePath:
 
 
 @cache
-def _leg() -> tuple[Planner, PosePath, np.ndarray, Pose, Obstacle]:
+def _problem() -> tuple[Planner, PosePath, np.ndarray, Pose, Obstacle]:
+    """Return a planner, a demonstration of 100 poses, start joints, a goal and an obstacle on the path."""
     arm, body, q = _panda()
     goal = Pose.from_position_quaternion([0.05, 0.3, 0.95], DOWN)
     ball = Obstacle(Sphere(0.04), Pose.from_position_quaternion([-0.03, 0.15, 1.02]), name="ball")
@@ -200,7 +206,7 @@ def _leg() -> tuple[Planner, PosePath, np.ndarray, Pose, Obstacle]:
 
 
 def _plan_row(name: str) -> Row:
-    planner, demo, q, goal, ball = _leg()
+    planner, demo, q, goal, ball = _problem()
     try:
         import_module("ompl.base")
     except ImportError:
@@ -220,25 +226,25 @@ def _plan_row(name: str) -> Row:
 
 
 def _plan_slope(name: str) -> Row:
-    planner, _, q, goal, _ = _leg()
+    planner, _, q, goal, _ = _problem()
     sizes = np.array([50, 200, 800, 2000])
     demos = [_demo(int(n)) for n in sizes]
     return _slope(name, sizes, seconds_per_call(*(partial(planner.plan, demo, q, goal, []) for demo in demos)))
 
 
 def _batch_row(name: str) -> Row:
-    planner, demo, q, goal, ball = _leg()
+    planner, demo, q, goal, ball = _problem()
     rng = np.random.default_rng(0)
     goals = [
         Pose.from_position_quaternion(goal.position + rng.uniform(-0.1, 0.1, 3), goal.quaternion) for _ in range(64)
     ]
-    problems = [Problem(demo, q, each, (ball,), k) for k, each in enumerate(goals)]
+    problems = [PlanRequest(demo, q, each, (ball,), seed=k) for k, each in enumerate(goals)]
     one, two = seconds_per_call(*(partial(plan_batch, problems, planner.arm, planner.body, workers=n) for n in (1, 2)))
     return row(name, two / one, "ratio", 1 / 1.7, f"{two * 1e3:.0f} ms against {one * 1e3:.0f} ms")
 
 
 def _depth_slope(name: str) -> Row:
-    """Cost of a tree in a closed cage, over its levels, with a fixed beam."""
+    """Measure how the cost of a tree in a closed cage grows with its levels, with a fixed beam."""
     half, walls = 0.5, []
     for axis in range(3):
         for sign in (-1.0, 1.0):
@@ -277,4 +283,4 @@ LINES: dict[str, Callable[[], Row]] = dict(
         _named("64 plans on 2 cores / on 1", _batch_row),
     ]
 )
-"""What is measured, by name."""
+"""Measurements by name."""

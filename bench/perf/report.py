@@ -1,4 +1,4 @@
-"""What a large report costs."""
+"""Cost of a large report: CPU time and memory."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from .measuring import Row, row
 
 EPISODES = 10_000
+"""Number of episodes in the report."""
 SECONDS = "report of 10 000 episodes, CPU time"
 MEMORY = "memory for a report of 10 000 episodes"
 _CODE = """
@@ -30,7 +31,7 @@ print(time.process_time() - cpu, time.perf_counter() - begun, peak)
 
 @cache
 def _measured() -> tuple[float, float, float]:
-    """CPU seconds, seconds and megabytes of a process that writes one."""
+    """Return CPU time [s], elapsed time [s] and peak memory [MB] of a process that writes a report."""
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-c", _CODE, folder, str(EPISODES)]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -49,4 +50,4 @@ def _memory() -> Row:
 
 
 REPORT_LINES: dict[str, Callable[[], Row]] = {SECONDS: _seconds, MEMORY: _memory}
-"""Name of a line: what measures it."""
+"""Measurements by name."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from importlib.util import find_spec
 
-from ...configs.run_config import RunConfig
+from ...configs import RunConfig
 from ..episodes.episode_records import known_record
 from ..workers.dispatcher import Dispatcher, Job, WorkerBackend
 from .measuring import Row, row
@@ -20,11 +20,11 @@ GEOMETRIC = "1000 geometric scenarios, all path makers, 2 cores / 5 minutes"
 CONFIG = RunConfig(name="perf", task="stack", demonstration="stack", video=False)
 SHORT = CONFIG.model_copy(update={"max_seconds": 10.0})
 BATCH, BATCHES = 8, 3
-"""Episodes that are timed together, and how often."""
+"""Number of episodes timed together, and number of batches."""
 
 
 def _jobs(config: RunConfig, count: int) -> list[Job]:
-    """Episodes as a run gives them out."""
+    """Return episode jobs as a run creates them."""
     from ..run.episode_jobs import EpisodeJobs
 
     cell = config.model_dump(mode="json")
@@ -36,6 +36,7 @@ def _jobs(config: RunConfig, count: int) -> list[Job]:
 
 
 def _episode() -> Row:
+    """Measure the processor time of episodes against their simulated time."""
     from ..run.episode_jobs import EpisodeJobs
 
     bench, jobs, shares = EpisodeJobs(), _jobs(CONFIG, 5), []
@@ -44,14 +45,14 @@ def _episode() -> Row:
         record = bench.do(job)["record"]
         shares.append((time.process_time() - begun) / record["seconds"])
     bench.close()
-    # the first compiles what is left
+    # the first episode compiles the remaining kernels
     share = statistics.median(shares[1:])
     note = f"{1.0 / share:.1f} times as fast as real time on one core, physics and planner; processor time"
     return row(EPISODE, share, "ratio", 1 / 3, note)
 
 
 def _efficiency(name: str, backend: WorkerBackend) -> Row:
-    """Two workers against one, both warm; batches in turn, so that noise hits both."""
+    """Measure two workers against one, both warm; batches alternate, so that noise affects both."""
     jobs, seconds, busy = _jobs(SHORT, BATCH), {1: [], 2: []}, []
     executors = {count: Dispatcher(backend, count, 600.0) for count in seconds}
     with ExitStack() as held:
@@ -92,7 +93,7 @@ def _actors() -> Row:
 
 
 def _geometric() -> Row:
-    """Some scenarios of every cell drawn, made and measured in this process, by processor time."""
+    """Measure the processor time of drawing, planning and judging some geometric scenarios of every cell."""
     from ..geometric.command import missing
     from ..geometric.jobs import TRACKS, rows_of
     from ..geometric.suite import cells, drawn, scenario_of
@@ -117,4 +118,4 @@ RUN_LINES: dict[str, Callable[[], Row]] = {
     ACTORS: _actors,
     GEOMETRIC: _geometric,
 }
-"""Name of a line: what measures it."""
+"""Measurements by name."""

@@ -1,4 +1,4 @@
-"""Speeds of the environments: steps against the bare physics, resets, workers."""
+"""Speeds of the environments: steps against the bare physics, resets, vector workers."""
 
 from __future__ import annotations
 
@@ -15,17 +15,23 @@ from ..task_table import TASKS
 from .measuring import Row, row, seconds_per_call
 
 SWAY_STEPS = 50
-"""Control steps in which the arm of the measured scene sways once."""
+"""Control steps per sway of the arm in the measured scene."""
 POUR = "Pour step, 30 beads / Stack step"
 TRAINED = ("reach", "place_one")
 TRAINING_STEPS = 1500
-"""Steps of 50 ms that a core should do per second."""
+"""Required number of 50 ms steps per second on one core."""
 MORE = 4
+"""Number of further environments over which memory growth is averaged."""
 WORKERS = "step of two vector workers, per environment / of one"
 
 
 def started(task: str, **options: Any) -> Any:
-    """The environment of a task, started from seed 0."""
+    """Build the environment of a task and reset it with seed 0.
+
+    Args:
+        task: name of the task.
+        options: arguments of the environment.
+    """
     import gymnasium as gym
 
     from ... import envs  # noqa: F401  (registers the ids)
@@ -36,7 +42,7 @@ def started(task: str, **options: Any) -> Any:
 
 
 def swaying(env: Any) -> np.ndarray:
-    """Actions (SWAY_STEPS, entries) with which all joints sway and the grippers are left as they are."""
+    """Return actions (SWAY_STEPS, entries) that sway all joints and leave the grippers alone."""
     sway = np.sin(2.0 * np.pi * np.arange(SWAY_STEPS) / SWAY_STEPS)
     rows = np.ones((len(env.arms), len(env.action_space.low) // len(env.arms)))
     rows[:, -1] = 0.0
@@ -44,10 +50,10 @@ def swaying(env: Any) -> np.ndarray:
 
 
 def _step(task: str, name: str) -> Row:
-    """Two scenes on the same way: one stepped as users do, one by MuJoCo alone under the controls of the first."""
+    """Measure a user's step against MuJoCo alone, in two scenes with the same motion and the same controls."""
     import mujoco
 
-    # twists are resolved where the arm is, so that a second sway would not have the same controls
+    # joint velocities: twists depend on the arm's pose, so a second sway would have other controls
     env, bare = (started(task, control_mode="joint_velocity") for _ in range(2))
     model, data, substeps = bare.sim.model, bare.sim.data, env.substeps
     actions, controls = swaying(env), []
@@ -105,7 +111,7 @@ def _workers() -> Row:
 
 
 def _training(task: str, name: str) -> Row:
-    """Whole episodes of random twists at 20 Hz, resets included, as a learner sees them."""
+    """Measure whole episodes of random twists at 20 Hz, resets included, as a learner uses the environment."""
     env, rng = started(task), np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (IDS[TASKS[task].id].steps, *env.action_space.shape))
 
@@ -120,7 +126,7 @@ def _training(task: str, name: str) -> Row:
 
 
 def _memory(task: str, name: str) -> Row:
-    """What each further environment of a process takes."""
+    """Measure the memory that each further environment of a process takes."""
     kept = [started(task)]
     before = _resident()
     kept += [started(task) for _ in range(MORE)]
@@ -128,18 +134,18 @@ def _memory(task: str, name: str) -> Row:
 
 
 def _resident() -> float:
-    """Memory of this process [MB]."""
+    """Return the resident memory of this process [MB]."""
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def step_line(task: str) -> str:
-    """Name of the line that measures a task's step."""
+    """Return the name of the measurement of a task's step."""
     return f"{_short(task)} step / raw mj_step"
 
 
 def training_line(task: str) -> str:
-    """Name of the line that measures how fast a learner could step a task."""
+    """Return the name of the measurement of a task's step as a learner uses it."""
     return f"{_short(task)} step at 20 Hz, resets included"
 
 
@@ -155,4 +161,4 @@ TASK_LINES: dict[str, Callable[[], Row]] = {
     POUR: _pour,
     WORKERS: _workers,
 }
-"""Name of a line: what measures it."""
+"""Measurements by name."""

@@ -1,1 +1,1 @@
-"""`onedemo plan`."""
+"""`onedemo plan`: one motion planned, judged and drawn."""

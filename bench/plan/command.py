@@ -1,4 +1,4 @@
-"""`onedemo plan`: a scene in; a plan, the judge's verdict on it and a picture out."""
+"""`onedemo plan`: a scene in; a plan, the judge's verdict and a picture out."""
 
 from __future__ import annotations
 
@@ -8,26 +8,36 @@ from typing import Any
 
 import numpy as np
 
+from ...configs import BadConfig
 from ...configs.plan_scene import PlanScene, load_scene, pose_of, shipped_scene
 from ...configs.plan_scene_schema import UrdfRobot
-from ...planner.errors import BadConfig, BadShape, OneDemoError, PlanFailed, UnknownName
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle, Sphere
-from ...planner.judge.certify import Certificate, certify
-from ...planner.log.motion_log import write_log
-from ...planner.planning.plan import ACCELERATION, Plan
-from ...planner.planning.planner import Planner
+from ...planner import (
+    Arm,
+    Body,
+    Certificate,
+    Obstacle,
+    Plan,
+    Planner,
+    PlanSettings,
+    Pose,
+    PosePath,
+    Sphere,
+    certify,
+    smoothed,
+    write_log,
+)
+from ...planner.errors import BadShape, OneDemoError, PlanFailed
+from ...planner.planning import refine
 from ...planner.planning.planning_scene import PlanningScene
-from ...planner.planning.settings import PlanSettings
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner.planning.refine import ACCELERATION, refused
 from ...planner.safety.safety_layer import contact_masks
 from ..console import console, labeled
 from .scene_plan import ScenePlan
 
 FOUND, NOT_FOUND, REFUSED = 0, 1, 3
-"""Exit codes: REFUSED is a plan that the judge does not accept, which must never be."""
+"""Exit codes. REFUSED: the judge rejects the plan, which must never happen."""
 FIGURES = (".png", ".pdf", ".svg")
+"""Allowed suffixes of a picture."""
 
 
 def run_plan(
@@ -40,16 +50,19 @@ def run_plan(
     smooth: bool = False,
     timed: bool = False,
 ) -> int:
-    """Plan in a scene, print what came of it and write what is wanted; returns the exit code.
+    """Plan in a scene, print the result and write the requested files.
 
     Args:
-        scene: a YAML file, or the name of a shipped scene.
-        overrides: `key=value` changes.
-        figure: a picture to write; the ending tells the kind.
-        output: the plan as a log that `planner.certify` reads.
-        judged: whether the independent judge looks at the plan.
-        smooth: whether the plan is led along a C1 curve, see `Plan.smoothed`.
-        timed: whether it is timed under limits, see `Plan.timed`.
+        scene: YAML file, or the name of a shipped scene.
+        overrides: `key=value` changes to the scene.
+        figure: picture to write, its format given by the suffix; None: no picture.
+        output: file for the plan as a log that the judge (`certify`) reads; None: no log.
+        judged: let the independent judge check the plan.
+        smooth: smooth the plan along a C1 curve; see `refine.smoothed`.
+        timed: time the plan under limits; see `refine.timed`.
+
+    Returns:
+        The exit code: `FOUND`, `NOT_FOUND` or `REFUSED`.
 
     Raises:
         BadConfig: the scene, an override or a file to write cannot be used.
@@ -60,12 +73,12 @@ def run_plan(
     err = console(stderr=True)
     with err.status("building the arm and the planner (compiled on first use: about a minute)"):
         planned = refined(plan_in(loaded), smooth=smooth, timed=timed)
-    certificate = certify(planned.log) if judged and planned.plan.success else None
+    certificate = certify(planned.plan.log()) if judged and planned.plan.success else None
     out = console()
     for label, style, text in _lines(planned, certificate):
         out.print(labeled(label, style, text))
     if output is not None and planned.plan.success:
-        _written("--output", output, lambda: write_log(planned.log, output))
+        _written("--output", output, lambda: write_log(planned.plan.log(), output))
         out.print(f"plan        {output}")
     elif output is not None:
         err.print(labeled("note", "yellow", f"there is no plan, so {output} was not written"))
@@ -80,7 +93,11 @@ def run_plan(
 
 
 def scene_path(scene: str) -> Path:
-    """The file itself, or the shipped scene of that name, also for a path as it stands in the source tree."""
+    """Return the path of a scene file, or of the shipped scene with this name or source-tree path.
+
+    Raises:
+        BadConfig: no such file.
+    """
     path = Path(scene)
     if path.is_file():
         return path
@@ -118,36 +135,41 @@ def plan_in(scene: PlanScene) -> ScenePlan:
 
 
 def refined(planned: ScenePlan, *, smooth: bool, timed: bool) -> ScenePlan:
-    """The plan made smooth, then timed, as is wanted; no plan where that does not stay clear."""
+    """Smooth and time a plan as requested; the plan fails if the refined motion does not stay clear.
+
+    Args:
+        planned: the scene and its plan.
+        smooth: see `refine.smoothed`.
+        timed: see `refine.timed`.
+    """
     plan = planned.plan
     if not plan.success:
         return planned
     try:
-        plan = plan.smoothed() if smooth else plan
-        plan = plan.timed() if timed else plan
+        plan = smoothed(plan) if smooth else plan
+        plan = refine.timed(plan) if timed else plan
     except PlanFailed as failure:
-        plan = plan.refused(failure)
+        plan = refused(plan, failure)
     return planned._replace(plan=plan)
 
 
 def _robot(scene: PlanScene) -> tuple[Arm, Body, np.ndarray]:
-    """Arm, body and usual joints of the scene's robot."""
+    """Return arm, body and usual joints (dof,) [rad] of the scene's robot."""
     robot = scene.config.robot
     if isinstance(robot, UrdfRobot):
         return _urdf_robot(scene, robot)
     from ...envs.scene.robot_bodies import robot_body
-    from ...envs.scene.robots import ROBOTS
+    from ...envs.scene.robots import robot_named
     from ...envs.scene.scene import compiled_scene
 
-    if robot not in ROBOTS:
-        with scene.blaming("robot"):
-            raise UnknownName("robot", robot, ROBOTS)
-    compiled = compiled_scene(robot)
-    return compiled.arms[0].arm, robot_body(robot), compiled.home[0]
+    with scene.blaming("robot"):
+        known = robot_named(robot)
+    compiled = compiled_scene(known)
+    return compiled.arms[0].arm, robot_body(known), compiled.home[0]
 
 
 def _urdf_robot(scene: PlanScene, robot: UrdfRobot) -> tuple[Arm, Body, np.ndarray]:
-    from ...planner.robot.body_readers import body_from_urdf
+    from ...planner import body_from_urdf
 
     with scene.blaming("robot"):
         file = scene.file(robot.urdf)
@@ -165,19 +187,19 @@ def _arm_from_urdf(file: Path, tcp_frame: str, base: Pose | None, speeds: Any) -
         return Arm.from_urdf(file, tcp_frame=tcp_frame, world_from_base=base, velocity_limits=speeds)
     except OneDemoError:
         raise
-    except ValueError:  # NumPy's, of broadcasting
+    except ValueError:  # NumPy could not broadcast the speeds
         raise BadShape("velocity_limits", np.shape(speeds), "one number, or one per joint") from None
 
 
 def _warm_up(planner: Planner, start: np.ndarray) -> None:
-    """Load the compiled loops, so that the time of the plan is that of planning."""
+    """Load the compiled loops, so that the plan's time contains planning only."""
     here = planner.arm.fk(start)
     far = Obstacle(Sphere(0.01), Pose.from_position_quaternion((0.0, 0.0, 50.0)))
     planner.plan(PosePath(here.dq[None]), start, here, (far,))
 
 
 def _lines(planned: ScenePlan, certificate: Certificate | None) -> Iterator[tuple[str, str, str]]:
-    """Label, style and text of every line for the terminal."""
+    """Yield label, style and text of every line for the terminal."""
     plan, name = planned.plan, planned.scene.name
     spent = f"in {_time(plan.seconds)}, {plan.tries} {'try' if plan.tries == 1 else 'tries'}"
     if not plan.success:

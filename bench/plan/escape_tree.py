@@ -1,4 +1,4 @@
-"""Painting an escape tree: its edges, kept and rejected, and the planes along the branch that came home."""
+"""Drawing of an escape tree: kept and rejected edges, and the planes along the branch that sees the path again."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.escape.repet import EscapeTree
-from ...planner.geometry.pose import PosePath
+from ...planner import EscapeTree, PosePath
+from ...planner.escape.tree_arrays import VERDICT
 from ..drawing.convex_view import ConvexSolid, DrawingView, hidden_by
 
 PLANE, KEPT, REJECTED = "#2f9e5b", "#7a7a7a", "#d9482b"
 PLANE_SIDE = 0.05
-"""Of the square that stands for a plane [m]."""
+"""Side [m] of the square that represents a plane."""
 MOST_REJECTED = 1500
-"""More would only be a blot."""
+"""Largest number of rejected edges drawn; more would merge into a blot."""
 DIM = 0.34
-"""Opacity behind a solid."""
+"""Opacity of edges behind a solid."""
 
 
 def paint_tree(
@@ -30,14 +30,23 @@ def paint_tree(
     *,
     every: bool = False,
 ) -> None:
-    """Edges, kept and rejected, and the planes along the branch that came home, or every plane."""
+    """Draw kept and rejected edges, and planes.
+
+    Args:
+        axes: axes of matplotlib.
+        view: the view.
+        tree: the escape tree.
+        path: tcp path of the plan.
+        solids: solids that hide edges.
+        every: draw every plane, instead of those along the branch that sees the path again.
+    """
     from matplotlib.collections import LineCollection, PolyCollection
 
     positions = PosePath(tree.poses).positions
     child = np.flatnonzero(tree.parents >= 0)
     edges = np.stack([positions[tree.parents[child]], positions[child]], axis=1)
-    good = np.isin(tree.verdicts[child], (0, 4))
-    bad = np.flatnonzero(tree.verdicts[child] == 1)
+    good = np.isin(tree.verdicts[child], (VERDICT.kept, VERDICT.goal_edge))
+    bad = np.flatnonzero(tree.verdicts[child] == VERDICT.rejected_edge)
     bad = bad[np.unique(np.linspace(0, len(bad) - 1, min(len(bad), MOST_REJECTED)).astype(int))] if len(bad) else bad
     for rows, color, width, alpha in ((bad, REJECTED, 0.35, 0.4), (np.flatnonzero(good), KEPT, 0.6, 0.75)):
         if not len(rows):
@@ -62,9 +71,17 @@ def paint_tree(
 
 
 def branch_planes(tree: EscapeTree, path: PosePath) -> list[int]:
-    """Planes at the nodes of the branch that comes home closest to a path; of all nodes where none came home."""
+    """Return the planes at the nodes of the branch closest to a path.
+
+    Args:
+        tree: the escape tree.
+        path: tcp path of the plan.
+
+    Returns:
+        Indices into `tree.planes`; a selection of all planes if no branch sees the path again.
+    """
     origins = np.array([plane.origin for plane in tree.planes]).reshape(-1, 3)
-    ends = np.flatnonzero(tree.verdicts == 4)
+    ends = np.flatnonzero(tree.verdicts == VERDICT.goal_edge)
     positions = PosePath(tree.poses).positions
     if not len(ends) or not len(origins):
         return [int(k) for k in np.unique(np.linspace(0, len(origins) - 1, 14).astype(int))] if len(origins) else []

@@ -1,4 +1,4 @@
-"""The picture of a plan, in the paper's colors: demonstration blue, final path magenta, collision-free path cyan."""
+"""Figure of a plan in the paper's colors: demonstration blue, final path magenta, collision-free path cyan."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
+from ...planner import Body, Certificate, Pose, final_path, guide_index, imitated_path
 from ...planner.imitation.segmentation import resampled
-from ...planner.imitation.tsia import final_path, guide_index, imitated_path
-from ...planner.judge.certify import Certificate
-from ...planner.robot.body import FRAME, RADIUS, A, B, Body
+from ...planner.robot.body import BODY
 from ...planner.robot.link_capsules import joint_frames
 from ..drawing.convex_view import ConvexSolid, DrawingView, back_to_front, ball_along, best_view, hidden_by, solid_of
 from ..drawing.solids import arm_patch, floor_corners, paint_arm, paint_floor, paint_shells, paint_solid, scale_ends
@@ -25,38 +23,39 @@ DEMONSTRATED, FINAL, FREE = "#1f4fd8", "#d81fb4", "#00a9c7"
 SHADOW = "#bdb6a8"
 FRAME_COLORS = ("#d43c3c", "#3aa03a", "#3a5fd4")
 GROUND = ("table", "floor", "ground")
-"""Boxes of these names are drawn as the floor that they are."""
+"""Names of boxes that are drawn as the floor."""
 HIDDEN = 0.34
 """Opacity of lines behind a solid."""
 TRIAD, LABEL, TOP = 0.055, 0.035, 0.06
-"""Lengths [m]."""
+"""Length of a triad's axes, distance of its label, and space above the content [m]."""
 DPI = 144
 OPTIONS: dict[str, dict[str, Any]] = {
     ".png": {"pil_kwargs": {"optimize": True}},
     ".pdf": {"metadata": {"CreationDate": None}},
     ".svg": {"metadata": {"Date": None}},
 }
-"""Small files, and the same ones every time."""
+"""Options of `savefig` for small, reproducible files."""
 BORDER = np.array([0.06, 0.06, 0.0])
-"""Of the floor, for the numbers on it [m]."""
+"""Border [m] of the floor for the numbers on it."""
 SIDES = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+"""Directions from the center of the floor to its sides."""
 WIDTH, ABOVE, BELOW = 9.0, 0.4, 0.72
-"""Of the figure, and of the room for title and legend [inches]."""
+"""Width of the figure, and heights reserved for title and legend [inch]."""
 
 
 class Content(NamedTuple):
-    """What is drawn, in the world.
+    """Content of the figure, in the world.
 
     Attributes:
-        demonstrated: (n, 3) where it was shown.
-        final: (n, 3) one screw to the guiding pose, then the imitated path.
-        executed: (n, 3) the tcp on its way; empty where no plan was found.
-        frames: start and goal.
-        solids: the obstacles, floor aside.
-        shelled: which of them keep the general distance, so that the shell is drawn.
-        arms: the arm at the start and at the end.
-        floor: height [m].
-        table: (4, 3) corners of the floor, None if none was given.
+        demonstrated: (n, 3) demonstrated path [m], where it was recorded.
+        final: (n, 3) final path [m]: one screw to the guiding pose, then the imitated path.
+        executed: (n, 3) path of the tcp [m]; empty if no plan was found.
+        frames: start and goal of the tcp.
+        solids: obstacles, without the floor.
+        shelled: per solid, whether it has the general margin, so that its shell is drawn.
+        arms: capsules of the arm at the start and, if a plan was found, at its end.
+        floor: height of the floor [m].
+        table: (4, 3) corners of the floor [m]; None if the scene has none.
     """
 
     demonstrated: np.ndarray
@@ -73,7 +72,17 @@ class Content(NamedTuple):
 def draw_plan(
     planned: ScenePlan, certificate: Certificate | None, files: Sequence[Path], *, every_plane: bool = False
 ) -> DrawingView:
-    """Draw a plan into every file, with the planes of the branch taken or every one; returns the view chosen."""
+    """Draw a plan into every file.
+
+    Args:
+        planned: the scene and its plan.
+        certificate: verdict of the judge, or None.
+        files: pictures to write.
+        every_plane: draw every plane of the tree, instead of those along the branch taken.
+
+    Returns:
+        The view chosen.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -110,7 +119,7 @@ def draw_plan(
 
 
 def content_of(planned: ScenePlan) -> Content:
-    """What is drawn of a plan."""
+    """Return the content of a plan's figure."""
     plan, scene, arm = planned.plan, planned.scene, planned.arm
     imitated = imitated_path(scene.demonstrated, scene.goal)
     start = arm.fk(planned.start)
@@ -141,14 +150,19 @@ def content_of(planned: ScenePlan) -> Content:
 
 
 def capsules_of(planned: ScenePlan, q: np.ndarray) -> list[ConvexSolid]:
-    """The arm's capsules at joints q (dof,), in the world."""
+    """Return the arm's capsules in the world.
+
+    Args:
+        planned: the scene and its plan.
+        q: (dof,) joints [rad].
+    """
     poses = [Pose.identity(), *joint_frames(planned.arm, q)]
     out = []
     body: Body = planned.body
     for row in body.rows:
-        pose = poses[int(row[FRAME]) + 1]
-        a, b = (pose.rotation @ row[first : first + 3] + pose.position for first in (A, B))
-        out.append(ball_along(a, b, float(row[RADIUS])))
+        pose = poses[int(row[BODY.frame]) + 1]
+        a, b = (pose.rotation @ row[first : first + 3] + pose.position for first in (BODY.a, BODY.b))
+        out.append(ball_along(a, b, float(row[BODY.radius])))
     return out
 
 
@@ -157,12 +171,16 @@ def _thinned(points: np.ndarray) -> np.ndarray:
 
 
 def room_of(content: Content) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner (3,) [m] of the box that is drawn: paths and obstacles, down to the floor."""
+    """Return the bounds of the drawn volume: paths and obstacles, down to the floor.
+
+    Returns:
+        Lowest and highest corner (3,) [m].
+    """
     solids = [s.core + sign * s.radius for s in content.solids for sign in (-1.0, 1.0)]
     points = np.vstack([content.demonstrated, content.final, content.executed, *solids])
     low, high = points.min(axis=0) - 0.1, points.max(axis=0) + 0.1
     if content.table is not None:
-        # a table ends where it ends, but is not drawn where nothing is
+        # the floor stops at the table's edges, and does not extend beyond the content
         edges = content.table.min(axis=0), content.table.max(axis=0)
         low[:2], high[:2] = np.maximum(low, edges[0])[:2], np.minimum(high, edges[1])[:2]
         low[:2], high[:2] = np.minimum(low, high - 0.2)[:2], np.maximum(high, low + 0.2)[:2]
@@ -171,7 +189,15 @@ def room_of(content: Content) -> tuple[np.ndarray, np.ndarray]:
 
 
 def window_of(content: Content, view: DrawingView) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (2,) [m] of what is seen: paths, frames, obstacles and the hand, with a border."""
+    """Return the bounds of the visible window: paths, frames, obstacles and the hand, with a border.
+
+    Args:
+        content: content of the figure.
+        view: the view.
+
+    Returns:
+        Lowest and highest corner (2,) [m] in the picture plane.
+    """
     low, high = room_of(content)
     corners = floor_corners(low - BORDER, high + BORDER)
     labels = 0.5 * (low + high) + (0.5 * (high - low) + 0.16) * SIDES
@@ -185,7 +211,7 @@ def window_of(content: Content, view: DrawingView) -> tuple[np.ndarray, np.ndarr
 
 
 def _stretched(low: np.ndarray, high: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same window, made wider or higher to these proportions."""
+    """Return the window widened or heightened to a ratio of width to height."""
     wanted = np.maximum(high - low, [ratio * (high - low)[1], (high - low)[0] / ratio])
     middle = 0.5 * (low + high)
     return middle - 0.5 * wanted, middle + 0.5 * wanted
@@ -218,7 +244,7 @@ def _paint(axes: Any, planned: ScenePlan, content: Content, view: DrawingView, e
 
 
 def _paint_line(axes: Any, points: np.ndarray, content: Content, view: DrawingView, **style: Any) -> None:
-    """A path, fainter where a solid is in front of it; below all paths a white border."""
+    """Draw a path, fainter where a solid is in front of it, with a white border below all paths."""
     flat, middles = view.flat(points), 0.5 * (points[1:] + points[:-1])
     start = 0
     for hidden, run in groupby(hidden_by(content.solids, middles, view)):
@@ -231,7 +257,7 @@ def _paint_line(axes: Any, points: np.ndarray, content: Content, view: DrawingVi
 
 
 def _paint_frame(axes: Any, pose: Pose, label: str, view: DrawingView, lines: np.ndarray) -> None:
-    """A triad and its name, which stands where it is farthest from the points (n, 2) of all lines."""
+    """Draw a triad and its label; the label stands where it is farthest from the points (n, 2) of all lines."""
     from matplotlib.patheffects import Normal, Stroke
 
     at = view.flat(pose.position)
@@ -293,5 +319,5 @@ def _title(planned: ScenePlan, certificate: Certificate | None) -> str:
 
 
 def content_matters(planned: ScenePlan) -> bool:
-    """Whether there is anything to keep clear of."""
+    """Return whether the scene has obstacles."""
     return bool(planned.scene.obstacles)

@@ -1,6 +1,6 @@
-"""What escape trees cost: the trees of shipped scenes, grown again and again.
+"""Cost of escape trees: the trees of shipped scenes, grown repeatedly.
 
-Times are those of the processor, not of the clock: what else the machine does counts little.
+Times are processor times, so that other load on the machine matters little.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from ...planner.collision.edge_certificates import tool_arrays
 from ...planner.escape import escape_tree
 from ...planner.escape.repet import EscapeTree, RepetSettings, escape_path
+from ...planner.escape.tree_arrays import NODE, OPTION
 from ...planner.geometry import screw
 from ...planner.geometry.pose import PosePath
 from ...planner.geometry.shapes import pack
@@ -23,22 +24,23 @@ from ...planner.safety.safety_layer import contact_masks
 from .scene_plan import ScenePlan
 
 LOOPS = 100
-"""Planes that are laid in a compiled loop for one sample."""
+"""Planes per sample, expanded in a compiled loop."""
 CELLS = 64
+"""Size of the cell table and of the tree in that loop."""
 
 
 @dataclass(frozen=True, slots=True)
 class TreeTimes:
-    """The first tree of a scene; times as mean and standard deviation over samples, in ms.
+    """Times of a scene's first tree [ms], as mean and standard deviation over samples.
 
     Attributes:
-        scene: its name.
-        planes: how many were laid.
-        levels: the most planes from a leaf to the root.
-        plane_ms: a plane at the root with its eight children, all edges proven, in a compiled loop.
-        detour_ms: a whole detour, called from Python: where the path is blocked, the tree, the way back.
-        detour_level_ms: the same for each level of the tree.
-        plan_ms: the clock's time of the whole plan of the arm, once.
+        scene: name of the scene.
+        planes: number of planes.
+        levels: largest number of planes between a leaf and the root.
+        plane_ms: a plane at the root with its eight children and all edges proven, in a compiled loop.
+        detour_ms: a whole detour called from Python: finding the blocked stretch, the tree, the return to the path.
+        detour_level_ms: `detour_ms` divided by the number of levels.
+        plan_ms: elapsed time of the arm's whole plan, measured once.
     """
 
     scene: str
@@ -52,20 +54,34 @@ class TreeTimes:
 
 @kernel
 def expand_loop(g, tree, goal, cells, options, state, repeats):
-    """Give the root its children on the way to a goal (1, 8) again and again."""
+    """Expand the root of a tree toward a goal repeatedly; see `escape_tree.expand`.
+
+    Args:
+        g: work array of the tool and the obstacles.
+        tree: (n, TREE_WIDTH) nodes, the root first.
+        goal: (1, 8) dual quaternion.
+        cells: (m,) cell table, cleared before every expansion.
+        options: packed `RepetSettings`.
+        state: (1,) state of the random generator.
+        repeats: number of expansions.
+    """
     towards = screw.load8(goal, 0)
     for _ in range(repeats):
         for k in range(len(cells)):
             cells[k] = -1.0
-        escape_tree.expand(g, tree, 0, 1, towards, cells, options, options[0], state)
+        escape_tree.expand(g, tree, 0, 1, towards, cells, options, options[OPTION.step], state)
     return tree[1, 0]
 
 
 def timed_tree(planned: ScenePlan, repeats: int) -> TreeTimes:
-    """Measure the first tree of a scene with so many samples.
+    """Measure the first tree of a scene.
+
+    Args:
+        planned: the scene and its plan.
+        repeats: number of samples.
 
     Raises:
-        ValueError: the way is free in the scene.
+        ValueError: no obstacle blocks the path, so that there is no tree.
     """
     scene = planned.scene
     settings = replace(planned.settings.repet, rounds=1, retries=0)
@@ -92,8 +108,8 @@ def timed_tree(planned: ScenePlan, repeats: int) -> TreeTimes:
 def _plane_ms(
     g: np.ndarray, tree: EscapeTree, path: PosePath, settings: RepetSettings, repeats: int
 ) -> tuple[float, float]:
-    options, rows = settings.packed(), np.zeros((CELLS, escape_tree.TREE_WIDTH))
-    options[escape_tree.WIDEST], options[escape_tree.RANDOM] = settings.distance, 0.0  # as a first tree has it
+    options, rows = settings.packed(), np.zeros((CELLS, NODE.width))
+    options[OPTION.largest_margin], options[OPTION.random] = settings.distance, 0.0  # as a first tree has it
     rows[0, :8] = tree.poses[0]
     cells, state, goal = np.full(CELLS, -1.0), np.ones(1), np.ascontiguousarray(path.dqs[-1:])
     mean, deviation = _milliseconds(lambda: expand_loop(g, rows, goal, cells, options, state, LOOPS), repeats)
@@ -101,14 +117,14 @@ def _plane_ms(
 
 
 def _nominal(planned: ScenePlan) -> PosePath:
-    """The final path, which is blocked."""
+    """Return the blocked final path."""
     imitated = imitated_path(planned.scene.demonstrated, planned.scene.goal)
     guide = guide_index(imitated, planned.settings.motion.guide) if len(imitated) > 1 else 0
     return final_path(planned.arm.fk(planned.start), imitated, guide)
 
 
 def _milliseconds(function: Callable[[], object], repeats: int) -> tuple[float, float]:
-    """Mean and standard deviation of the processor's time of a call [ms]; the first one only loads what is needed."""
+    """Return mean and standard deviation of a call's processor time [ms]; a first call for loading is not counted."""
     function()
     samples = []
     for _ in range(repeats):
@@ -119,7 +135,7 @@ def _milliseconds(function: Callable[[], object], repeats: int) -> tuple[float, 
 
 
 def levels_of(tree: EscapeTree) -> int:
-    """The most planes on the way from a node to the root."""
+    """Return the largest number of planes between a node and the root."""
     depth = np.zeros(len(tree.parents), dtype=int)
     for row, parent in enumerate(tree.parents):
         depth[row] = 0 if parent < 0 else depth[parent] + 1

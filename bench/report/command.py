@@ -1,19 +1,23 @@
-"""`onedemo report RUN...`."""
+"""The command `onedemo report RUN...`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from ...planner.errors import BadConfig
+from ...configs import BadConfig
 from ..console import COMMAND_LINE, console
 from .report import write_report_of
 
 
 def run_report(runs: list[Path], output: Path | None) -> None:
-    """Write the report of run folders and say where it is.
+    """Write the report of run folders and print its files.
+
+    Args:
+        runs: run folders.
+        output: folder of the report; None: the only run folder.
 
     Raises:
-        BadConfig: several runs and no `--output`, or what `write_report_of` raises.
+        BadConfig: `output` is missing for several runs, or an error of `write_report_of`.
     """
     if output is None and len(runs) > 1:
         raise BadConfig(COMMAND_LINE, "--output", "is needed where several runs are compared")

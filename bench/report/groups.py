@@ -1,4 +1,4 @@
-"""Methods side by side: groups of episodes, rates with intervals, and tests of pairs that started alike."""
+"""Comparison of methods: groups of episodes, rates with intervals, and tests of pairs with equal starts."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...configs import RunConfig
 from ...configs.dotted_keys import leaves
-from ...configs.run_config import BESIDE, LATER, RunConfig
+from ...configs.run_config import BESIDE, LATER
 from ..document.untrusted_text import plain
 from ..episodes.episode_records import EpisodeRecord
 from ..episodes.scenarios import place_of as drawn_from
@@ -24,15 +25,15 @@ from ..workers.dispatcher import HUNG
 from .read_runs import Run
 
 ORDERED = ("L0", "L1", "L2", "L3", "L4")
-"""Levels that get harder one after the other."""
+"""Levels in order of difficulty."""
 LONGEST_CHANGES = 40
-"""Characters of the settings in a label."""
+"""Largest number of characters of the settings in a label."""
 SAFE, UNSAFE = "safe success", "unsafe success"
-"""The two outcomes that are no failure."""
+"""The two outcomes that are not failures."""
 
 
 class Setting(NamedTuple):
-    """What methods are compared on; the level with what else must be said of it."""
+    """Common conditions of compared methods; the level includes further conditions, see `RunConfig.condition`."""
 
     task: str
     robot: str
@@ -44,10 +45,10 @@ class Group:
     """The episodes of one cell.
 
     Attributes:
-        label: the method, with what tells it from others of the same method.
-        cell: what was asked for.
-        planned: how many episodes.
-        records: what came of it, by index.
+        label: the method, with the settings that distinguish it from others of the same method.
+        cell: config of the cell.
+        planned: number of planned episodes.
+        records: finished episodes, by index.
     """
 
     label: str
@@ -57,45 +58,45 @@ class Group:
 
     @property
     def setting(self) -> Setting:
-        """What it can be compared on."""
+        """Conditions on which the group is compared with others."""
         return _setting(self.cell)
 
     @cached_property
     def success(self) -> Rate:
-        """Share of successes."""
+        """Rate of successes."""
         return Rate.of(sum(record.success for record in self.records), len(self.records))
 
     @cached_property
     def safe_success(self) -> Rate:
-        """Share of successes without an unwanted contact."""
+        """Rate of successes without any unwanted contact."""
         return Rate.of(sum(record.safe_success for record in self.records), len(self.records))
 
     @cached_property
     def outcomes(self) -> Counter[str]:
-        """How many episodes ended how: `SAFE`, `UNSAFE`, or the reason of the failure."""
+        """Number of episodes by outcome: `SAFE`, `UNSAFE`, or the reason of the failure."""
         return Counter(outcome_of(record) for record in self.records)
 
     def values(self, name: str) -> np.ndarray:
-        """The known values of a metric; of one about successes only theirs."""
+        """Return the known values of a metric (n,); if the metric is for successes only, those of successes."""
         only = METRICS[name].successes
         found = (record.metrics.get(name) for record in self.records if record.success or not only)
         return np.array([value for value in found if value is not None], dtype=np.float64)
 
 
 def outcome_of(record: EpisodeRecord) -> str:
-    """How an episode ended."""
+    """Return the outcome of an episode: `SAFE`, `UNSAFE`, or the reason of the failure."""
     if record.success:
         return SAFE if record.safe else UNSAFE
-    # the task's own "timeout" is of simulated time
+    # the task's own "timeout" refers to simulated time
     if record.lost and record.failure_reason == HUNG:
         return "hung"
     return record.failure_reason or "unknown"
 
 
 def groups_of(run: Run) -> list[Group]:
-    """All cells in the order of tables: task, robot, level, method.
+    """Return all cells as groups in the order of tables: task, robot, level, method.
 
-    Cells of one method on the same setting are told apart by the keys in which they differ, else by their digests.
+    Labels distinguish cells of one method on the same setting by the keys in which they differ, else by their digests.
     """
     alike: dict[tuple[Setting, str], list[RunConfig]] = {}
     for cell in run.cells.values():
@@ -117,7 +118,7 @@ def _setting(cell: RunConfig) -> Setting:
 
 
 def _differing(cell: RunConfig, others: list[RunConfig]) -> str:
-    """Keys and values in which a cell is not like all others, in one line, as on the command line; "" of none."""
+    """Return in one line the keys and values that distinguish a cell, as on the command line; "" if there are none."""
     written = [_written(each) for each in others]
     own = _written(cell)
     parts = [f"{key}={value}" for key, value in own.items() if any(each.get(key, own) != value for each in written)]
@@ -125,14 +126,14 @@ def _differing(cell: RunConfig, others: list[RunConfig]) -> str:
 
 
 def _written(cell: RunConfig) -> dict[str, Any]:
-    """What decides how episodes go, by keys with dots; settings without their common beginning."""
+    """Return the values that determine the episodes, by dotted keys; keys of settings without their common prefix."""
     values = cell.model_dump(mode="json", exclude={*BESIDE, *LATER, "settings"}, exclude_defaults=True)
     settings = {key: value for key, value in cell.settings.items() if key != "training_steps"}
     return dict(sorted([*leaves(values), *leaves(settings)]))
 
 
 def groups_by_task(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:
-    """Groups of each task and robot."""
+    """Return the groups by task and robot."""
     found: dict[tuple[str, str], list[Group]] = {}
     for group in groups:
         found.setdefault((group.cell.task, group.cell.robot), []).append(group)
@@ -140,14 +141,14 @@ def groups_by_task(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:
 
 
 def place_of_setting(setting: Setting) -> tuple[int | str, ...]:
-    """Sorting key."""
+    """Return the sorting key of a setting."""
     tasks = list(TASKS)
     task = tasks.index(setting.task) if setting.task in tasks else len(tasks)
     return (task, setting.task, setting.robot, *rank(setting.level))
 
 
 def rank(level: str) -> tuple[int, str, int, str]:
-    """Sorting key of a level; the more key poses the sooner."""
+    """Return the sorting key of a level; more key poses come first."""
     name, _, rest = level.partition(" ")
     count = re.match(r"\d+", rest)
     place = ORDERED.index(name) if name in ORDERED else len(ORDERED)
@@ -156,16 +157,16 @@ def rank(level: str) -> tuple[int, str, int, str]:
 
 @dataclass(frozen=True, slots=True)
 class SuccessTest:
-    """Two methods on the same scenarios.
+    """Paired test of success of two methods on the same scenarios.
 
     Attributes:
-        setting: where.
-        label: who is compared with the reference.
-        pairs: scenarios that both have done.
-        only_reference: those in which the reference alone succeeded.
-        only_other: those in which the other alone did.
-        p: McNemar's.
-        adjusted: after Holm over all tests of the same method.
+        setting: common conditions.
+        label: label of the method compared with the reference.
+        pairs: number of scenarios run by both.
+        only_reference: number of pairs in which only the reference succeeded.
+        only_other: number of pairs in which only the other method succeeded.
+        p: McNemar's p-value.
+        adjusted: p-value after Holm's correction over all tests of the method.
     """
 
     setting: Setting
@@ -179,7 +180,15 @@ class SuccessTest:
 
 @dataclass(frozen=True, slots=True)
 class MetricTest:
-    """A metric of two methods on the same scenarios: the reference less the other, in the metric's unit."""
+    """Paired test of a metric of two methods on the same scenarios.
+
+    Attributes:
+        setting: common conditions.
+        label: label of the method compared with the reference.
+        name: name of the metric.
+        difference: reference minus the other method, in the metric's printed unit.
+        adjusted: p-value after Holm's correction over all tests of the method and the metric.
+    """
 
     setting: Setting
     label: str
@@ -189,12 +198,17 @@ class MetricTest:
 
     @property
     def metric(self) -> Metric:
-        """What is compared."""
+        """The compared metric."""
         return METRICS[self.name]
 
 
 def success_tests(groups: list[Group], succeeded: Callable[[EpisodeRecord], bool]) -> list[SuccessTest]:
-    """Every method against the reference, wherever both have run the same scenarios."""
+    """Return the tests of every method against the reference where both ran the same scenarios.
+
+    Args:
+        groups: groups of the run.
+        succeeded: verdict on an episode, like success or safe success.
+    """
     found = []
     for reference, other in _opponents(groups):
         pairs = [(succeeded(a), succeeded(b)) for a, b in _paired(reference, other)]
@@ -208,7 +222,7 @@ def success_tests(groups: list[Group], succeeded: Callable[[EpisodeRecord], bool
 
 
 def metric_tests(groups: list[Group]) -> list[MetricTest]:
-    """Every paired metric of every method against the reference, where both have it in at least `FEWEST` scenarios."""
+    """Return the tests of every paired metric of every method against the reference, given at least `FEWEST` pairs."""
     found: list[tuple[Setting, str, str, Difference]] = []
     for reference, other in _opponents(groups):
         pairs = _paired(reference, other)
@@ -227,7 +241,7 @@ def metric_tests(groups: list[Group]) -> list[MetricTest]:
 
 
 def _opponents(groups: list[Group]) -> list[tuple[Group, Group]]:
-    """The reference and each other method that was run on scenarios drawn alike, and was shown as much."""
+    """Return the reference with each other method on scenarios of the same key and with the same conditions."""
     found = []
     for place in dict.fromkeys((drawn_from(group.cell), group.setting) for group in groups):
         here = [group for group in groups if (drawn_from(group.cell), group.setting) == place]
@@ -243,7 +257,7 @@ def _paired(first: Group, second: Group) -> list[tuple[EpisodeRecord, EpisodeRec
 
 
 def _adjusted(tests: list[tuple[str, float]]) -> list[float]:
-    """Holm's p-values within each family; the families by name."""
+    """Return Holm's p-values within each family; tests name their family."""
     out = [float("nan")] * len(tests)
     for family in {name for name, _ in tests}:
         places = [k for k, (name, _) in enumerate(tests) if name == family]

@@ -1,4 +1,4 @@
-"""Figures of how episodes ended, how near they came, and how long the policy thought; see `rate_figures`."""
+"""Figures of outcomes, clearance and planner time; see `rate_figures` for rates."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ OUTCOMES = {
 """Color, hatch and words of every outcome, in the order of bars."""
 OTHER = ("#444444", "", "other")
 TALLEST = 8.3
-"""Of a figure that must fit on a page with its caption [inch]."""
+"""Largest height [inch] of a figure that fits on a page with its caption."""
 FARTHEST = 120.0
-"""Clearances beyond this [mm] are all far."""
+"""Largest drawn clearance [mm]."""
 CURVE = 200
-"""Points of a distribution that are drawn."""
+"""Largest number of drawn points of a distribution."""
 
 
 def failures(lines: list[Series]) -> Any:
-    """How episodes ended, as shares: one bar per level and method."""
+    """Draw the shares of outcomes: one bar per level and method."""
     rows = [(group.setting.level, line.label, group) for line in lines for group in line.groups if group.records]
     rows.sort(key=lambda row: rank(row[0]))
     levels = list(dict.fromkeys(level for level, _, _ in rows))
@@ -72,7 +72,7 @@ def failures(lines: list[Series]) -> Any:
 
 
 def _bars(left: np.ndarray, share: np.ndarray, places: np.ndarray, **style: Any) -> Any:
-    """Bars (n,) of one outcome as one collection: a tenth of the time and of the bytes of as many bars with hatches."""
+    """Return the bars (n,) of one outcome as one collection: ten times faster and smaller than single hatched bars."""
     from matplotlib.collections import PolyCollection
 
     x = np.stack([left, left, left + share, left + share], axis=1)
@@ -82,7 +82,7 @@ def _bars(left: np.ndarray, share: np.ndarray, places: np.ndarray, **style: Any)
 
 
 def timing(lines: list[Series]) -> Any | None:
-    """Time of the policy per tick: median, 99th percentile and the longest of all, on a logarithmic axis."""
+    """Draw median, 99th percentile and maximum of the policy's time per tick, logarithmically; None without times."""
     known = [(line, [r.tick_us for g in line.groups for r in g.records if max(r.tick_us) > 0.0]) for line in lines]
     known = [(line, ticks) for line, ticks in known if ticks]
     if not known:
@@ -109,7 +109,7 @@ def timing(lines: list[Series]) -> Any | None:
 
 
 def timing_ticks(lines: Iterable[Series]) -> list[float]:
-    """Times between two ticks in these episodes [ms], each once."""
+    """Return the tick durations in these episodes [ms], sorted and without repetition."""
     cells = [group.cell for line in lines for group in line.groups]
     rates = {int(cell.env.get("control_frequency", IDS[TASKS[cell.task].id].frequency)) for cell in cells}
     return sorted(1e3 / rate for rate in rates)
@@ -130,7 +130,7 @@ def _timing_legend(between: list[float]) -> tuple[list[Any], list[str]]:
 
 
 def clearance(lines: list[Series]) -> Any | None:
-    """Distribution of the smallest clearance of episodes with obstacles; None where there were none."""
+    """Draw the distribution of the smallest clearance per episode; None without obstacles."""
     known = [
         (line, np.sort(np.concatenate([1e3 * group.values("clearance") for group in line.groups]))) for line in lines
     ]

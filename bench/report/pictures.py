@@ -1,4 +1,4 @@
-"""The figures of a report, drawn and written."""
+"""Drawing and writing of a report's figures."""
 
 from __future__ import annotations
 
@@ -16,11 +16,20 @@ from .read_runs import Run, speeds_of
 
 FOLDER = "figures"
 KINDS = ("success", "speed", "failures", "clearance", "timing")
-"""Beginnings of the files' names, one for each question."""
+"""Kinds of figures, one for each question; file names begin with them."""
 
 
 def drawn(run: Run, groups: list[Group], output: Path) -> dict[str, list[Picture]]:
-    """All figures by kind, one per task and robot where there is something to draw; PNG and PDF are written."""
+    """Draw all figures, one per kind, task and robot if there are data, and write them as PNG and PDF.
+
+    Args:
+        run: the run.
+        groups: groups of the run.
+        output: folder of the report.
+
+    Returns:
+        Pictures by kind.
+    """
     speeds = speeds_of(run.suite)
     draw: dict[str, Callable[[list[Series]], Any]] = {
         "success": by_level,
@@ -45,5 +54,10 @@ def drawn(run: Run, groups: list[Group], output: Path) -> dict[str, list[Picture
 
 
 def with_caption(pictures: list[Picture], caption: str) -> list[Pictures]:
-    """One block, or none where there is no picture."""
+    """Return one block of pictures with a caption, or no block without pictures.
+
+    Args:
+        pictures: pictures of one kind.
+        caption: their common caption.
+    """
     return [Pictures(pictures, caption)] if pictures else []

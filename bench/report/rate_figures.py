@@ -1,4 +1,4 @@
-"""Figures of rates with their intervals: one per task and question, each as wide as a column of a paper."""
+"""Figures of rates with their intervals: one per task and question, each one column of a paper wide."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..statistics import Rate
 from .groups import ORDERED, Group, rank
 
 HEIGHT, COLUMNS = 2.2, 3
-"""Of a figure without its legend [inch]; columns of the legend."""
+"""Height of a figure without its legend [inch]; number of columns of the legend."""
 SPREAD = 0.62
-"""Of the room between two ticks, the part over which methods are spread, so that their intervals do not hide."""
+"""Fraction of the distance between two ticks over which methods are spread, so that their intervals do not overlap."""
 EDGES = (0.0, 0.1, 0.2, 0.3)
-"""Speeds [m/s] between which scenarios are counted together."""
+"""Speeds [m/s] that delimit the bins of scenarios."""
 
 
 class Series(NamedTuple):
-    """What a method's line is made of: its groups of one task, and how it is drawn."""
+    """Line of a method in a figure: label, name of the method, and its groups of one task."""
 
     label: str
     method: str
@@ -30,7 +30,7 @@ class Series(NamedTuple):
 
 
 def series_of(groups: Iterable[Group]) -> list[Series]:
-    """Groups of one task by method."""
+    """Return the lines of one task's groups, in the order of methods."""
     found: dict[str, list[Group]] = {}
     for group in groups:
         found.setdefault(group.label, []).append(group)
@@ -39,7 +39,7 @@ def series_of(groups: Iterable[Group]) -> list[Series]:
 
 
 def _points(axes: Any, line: Series, x: np.ndarray, rates: list[Rate], *, joined: bool = True) -> Any:
-    """Rates with their intervals; returns the handle for a legend."""
+    """Draw rates with their intervals, and return the handle for a legend."""
     look, shares = look_of(line.label), np.array([rate.share for rate in rates])
     low = shares - np.array([rate.low for rate in rates])
     high = np.array([rate.high for rate in rates]) - shares
@@ -51,14 +51,19 @@ def _points(axes: Any, line: Series, x: np.ndarray, rates: list[Rate], *, joined
 
 
 def share_axis(axes: Any, label: str) -> None:
-    """Let y go from 0 to 1, always."""
+    """Fix the y axis to the range 0 to 1.
+
+    Args:
+        axes: matplotlib axes.
+        label: label of the y axis.
+    """
     axes.set(ylim=(0.0, 1.0), ylabel=label)
     axes.set_yticks(np.linspace(0.0, 1.0, 6))
     axes.grid(False, axis="x")
 
 
 def by_level(lines: list[Series]) -> Any:
-    """Safe success against level."""
+    """Draw safe success against level."""
     levels = list(dict.fromkeys(g.setting.level for line in lines for g in line.groups))
     levels.sort(key=rank)
     figure, axes = new_figure(HEIGHT, len(lines), COLUMNS)
@@ -85,7 +90,12 @@ def _shifts(count: int) -> np.ndarray:
 
 
 def by_speed(lines: list[Series], speeds: dict[str, float]) -> Any | None:
-    """Safe success against the speed of the fastest obstacle; None where no scenario says its speed."""
+    """Draw safe success against the speed of the fastest obstacle; None without known speeds.
+
+    Args:
+        lines: lines of one task.
+        speeds: largest speed of an obstacle [m/s] by the scenario's fingerprint.
+    """
     known = [(line, _by_bin(line, speeds)) for line in lines]
     known = [(line, bins) for line, bins in known if bins]
     if not known:
@@ -107,7 +117,7 @@ def by_speed(lines: list[Series], speeds: dict[str, float]) -> Any | None:
 
 
 def _by_bin(line: Series, speeds: dict[str, float]) -> dict[int, list[bool]]:
-    """Safe success of the episodes in each bin of speeds, bin 0 those with obstacles that stand still."""
+    """Return safe success of the episodes in each bin of speeds; bin 0 is for static obstacles."""
     bins: dict[int, list[bool]] = {}
     for group in line.groups:
         for record in group.records:

@@ -1,4 +1,4 @@
-"""Run folders as a report reads them: what was asked for, on what it ran, and every episode. Nothing is run here."""
+"""Reading of run folders for a report: configs, environment, and every episode. Nothing is run here."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...configs.run_config import RunConfig
-from ...planner.errors import BadConfig
+from ...configs import BadConfig, RunConfig
 from ...planner.strict_json import Refused, parsed
 from ..episodes.episode_records import EpisodeRecord, result_of
 from ..episodes.run_folder import read_cells, recorded
@@ -17,24 +16,24 @@ from ..episodes.scenarios import FILE as SCENARIOS
 from ..episodes.scenarios import Suite, check_mergeable, read_suite
 
 MAX_BYTES = 64 * 2**20
-"""Of a description of a machine."""
+"""Largest size of the file that describes the machine [bytes]."""
 MOST_NOTES = 10
-"""Lines about damaged files that are said one by one."""
+"""Number of notes about damaged files that are listed one by one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run folder, or several that were merged.
+    """One run folder, or several merged run folders.
 
     Attributes:
-        folders: where it is; the first is what paths in a report are relative to.
-        cells: by digest, in the order of the run.
-        labels: of each cell by digest.
-        records: of each cell by digest, by index.
+        folders: run folders; paths in a report are relative to the first.
+        cells: configs of the cells by digest, in the order of the run.
+        labels: label of each cell by digest.
+        records: episodes of each cell by digest, in the order of their indices.
         suite: the scenarios.
-        environment: see `environment.fingerprint`.
-        command: what started it, "" if it is not known.
-        warnings: what a reader should know about the files.
+        environment: see `provenance.fingerprint`.
+        command: command line of the run; "" if unknown.
+        warnings: notes for the reader about the files.
     """
 
     folders: tuple[Path, ...]
@@ -47,20 +46,20 @@ class Run:
     warnings: tuple[str, ...]
 
     def planned(self, digest: str) -> int:
-        """How many episodes of a cell there can be: one for each scenario that could be drawn."""
+        """Return the number of feasible episodes of a cell: one for each scenario that could be drawn."""
         return len(self.suite.feasible(self.cells[digest]))
 
     @property
     def every(self) -> list[EpisodeRecord]:
-        """The episodes of all cells."""
+        """Episodes of all cells."""
         return [record for found in self.records.values() for record in found]
 
 
 def read_run(folder: Path) -> Run:
-    """A run folder, whether it is finished or not, in parts or whole.
+    """Return a run folder, finished or not, merged or in parts.
 
     Raises:
-        BadConfig: naming the file, the key and what is wrong with it.
+        BadConfig: the folder cannot be used; the error names file, key and reason.
     """
     if not folder.is_dir():
         raise BadConfig(folder, "", "is not a run folder: there is no such folder")
@@ -90,10 +89,10 @@ def read_run(folder: Path) -> Run:
 
 
 def merged(runs: list[Run]) -> Run:
-    """Several runs as one; of an episode that is in more than one the first counts.
+    """Return several runs as one; if an episode is in several runs, the first run counts.
 
     Raises:
-        BadConfig: they are not of the same scenarios.
+        BadConfig: the runs have different scenarios.
     """
     first = runs[0]
     if len(runs) == 1:
@@ -133,7 +132,7 @@ def _environment(path: Path) -> dict[str, Any]:
 
 
 def _warnings(folder: Path, notes: list[str], unsound: int) -> tuple[str, ...]:
-    """What was passed over, without the place of the folder."""
+    """Return notes about skipped lines and records, without the folder's path."""
     said = [note.removeprefix(f"{folder}/") for note in notes[:MOST_NOTES]]
     if len(notes) > MOST_NOTES:
         said.append(f"{len(notes) - MOST_NOTES} more lines were passed over")
@@ -143,7 +142,7 @@ def _warnings(folder: Path, notes: list[str], unsound: int) -> tuple[str, ...]:
 
 
 def _is_sound(record: EpisodeRecord) -> bool:
-    """Whether all entries are of the types that they should be."""
+    """Return whether all fields have their declared types."""
     number = (int, float)
     return (
         all(isinstance(getattr(record, name), str) for name in _WORDS)
@@ -162,7 +161,7 @@ _WORDS = [field.name for field in fields(EpisodeRecord) if field.type == "str"]
 
 
 def speeds_of(suite: Suite) -> dict[str, float]:
-    """Largest speed [m/s] of the obstacles of each scenario that has some, by its fingerprint; 0: all stand still."""
+    """Return the largest obstacle speed [m/s] of each scenario with obstacles by its fingerprint; 0: all are static."""
     found = {}
     for scenario in suite.scenarios:
         start = scenario.get("start")
@@ -173,7 +172,7 @@ def speeds_of(suite: Suite) -> dict[str, float]:
 
 
 def peak_speed(obstacle: Any) -> float:
-    """Largest speed [m/s] of an obstacle described as by `starts.obstacle`; 0 of one that stands still."""
+    """Return the largest speed [m/s] of an obstacle as described by `start_states.obstacle`; 0 if it is static."""
     if not isinstance(obstacle, dict):
         return 0.0
     try:

@@ -1,11 +1,11 @@
-"""`report.md`, `report.html`, figures and tables of run folders; what is read is their files, nothing is run."""
+"""`report.md`, `report.html`, figures and tables of run folders, made from their files; nothing is run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from ...planner.errors import BadConfig
+from ...configs import BadConfig
 from ..atomic_files import write_whole
 from ..document.document import Block, Bullets, Code, Document, Heading, Link, Paragraph, Picture, Pictures, Table
 from ..document.html_page import html_of
@@ -38,19 +38,29 @@ DIFFERENCES = (
 
 
 def write_report(folder: Path) -> list[Path]:
-    """The report of one run folder, written into it; the files written, the report itself first.
+    """Write the report of one run folder into the folder.
+
+    Returns:
+        The files written, the report itself first.
 
     Raises:
-        BadConfig: the folder is none, or a file in it cannot be read.
+        BadConfig: the folder is not a run folder, or a file in it cannot be read.
     """
     return write_report_of([folder], folder)
 
 
 def write_report_of(folders: list[Path], output: Path) -> list[Path]:
-    """The report of several run folders of the same scenarios as one; the files written, the report itself first.
+    """Write one report of several run folders of the same scenarios.
+
+    Args:
+        folders: run folders.
+        output: folder of the report.
+
+    Returns:
+        The files written, the report itself first.
 
     Raises:
-        BadConfig: a folder cannot be used, they do not belong together, or nothing can be written.
+        BadConfig: a folder cannot be used, the runs have different scenarios, or the report cannot be written.
     """
     run = merged([read_run(folder) for folder in folders])
     try:
@@ -66,7 +76,7 @@ def write_report_of(folders: list[Path], output: Path) -> list[Path]:
 
 
 def _rows(run: Run) -> list[dict[str, Any]]:
-    """A row of `summary.json` for each cell."""
+    """Return a row of `summary.json` for each cell."""
     return [
         {**summary_row(cell, run.records[digest]), "cell": digest, "label": run.labels[digest]}
         for digest, cell in run.cells.items()
@@ -108,7 +118,7 @@ def _document(run: Run, output: Path) -> Document:
 
 
 def _first_episodes(run: Run, output: Path) -> list[Block]:
-    """Figures and videos of the first episodes, where runs have made them, or why there are none."""
+    """Return figures and videos of the first episodes, or the reasons why there are none."""
     blocks = []
     for folder in run.folders:
         shown = written_json(folder, SHOWN)

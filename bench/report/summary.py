@@ -1,4 +1,4 @@
-"""What a run says in a few lines: one row of numbers for each cell, and words for the terminal."""
+"""Summary of a run: one row of numbers for each cell, and lines for the terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from ...configs.grid import RunConfig
+from ...configs import RunConfig
 from ..atomic_files import write_whole
 from ..episodes.episode_records import EpisodeRecord
 from ..statistics import median, wilson
@@ -18,7 +18,12 @@ SUMMARY = "summary.json"
 
 
 def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
-    """The numbers of one cell: method, task, robot, level and what came of it; None where there is nothing to tell."""
+    """Return the numbers of one cell: method, task, robot, level and results; None for numbers that do not exist.
+
+    Args:
+        config: config of the cell.
+        records: its finished episodes.
+    """
     successes = sum(record.success for record in records)
     low, high = wilson(successes, len(records))
     error = TASKS[config.task].error
@@ -57,7 +62,7 @@ def _middle_and_most(key: str, values: list[float]) -> dict[str, float | None]:
 
 
 def verdict(row: dict[str, Any]) -> list[str]:
-    """Lines for the terminal and the top of the report."""
+    """Return the lines about a cell for the terminal."""
     failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
     times = f"{_said(row['tick_us_median'], '.0f')} us per tick (median), {_said(row['tick_us_p99'], '.0f')} us (p99)"
     what, _, unit = row["error"].rpartition(" [")
@@ -74,7 +79,7 @@ def verdict(row: dict[str, Any]) -> list[str]:
 
 
 def _beside_obstacles(row: dict[str, Any]) -> list[str]:
-    """A line about obstacles, if there were any."""
+    """Return a line about obstacles, if there were any."""
     if row["clearance_mm_min"] is None and not row["refused"]:
         return []
     drawn = row["episodes"] + row["refused"]
@@ -85,7 +90,12 @@ def _beside_obstacles(row: dict[str, Any]) -> list[str]:
 
 
 def write_summary(path: Path, rows: list[dict[str, Any]]) -> None:
-    """The rows as `{"rows": [...]}`."""
+    """Write the rows as `{"rows": [...]}`.
+
+    Args:
+        path: file to write.
+        rows: rows of `summary_row`.
+    """
     write_whole(path, json.dumps({"rows": rows}, indent=2, allow_nan=False) + "\n")
 
 

@@ -1,4 +1,4 @@
-"""The tables of a report."""
+"""Tables of a report."""
 
 from __future__ import annotations
 
@@ -19,23 +19,28 @@ from .rate_figures import series_of
 
 NOTHING = "–"
 MANY = 20
-"""Rows from which on a list is not shown at once."""
+"""Number of rows above which a table is collapsed."""
 
 
 def settings_of(groups: list[Group]) -> dict[Setting, str]:
-    """Settings with their names: the robot is left out where there is but one."""
+    """Return the settings with their names; the names omit the robot if there is only one."""
     robots = {group.setting.robot for group in groups}
     names = {group.setting: f"{group.setting.task} {group.setting.level}" for group in groups}
     return {key: name if len(robots) == 1 else f"{name} {key.robot}" for key, name in names.items()}
 
 
 def labels_of(groups: list[Group]) -> list[str]:
-    """Labels of all methods in their order."""
+    """Return the labels of all methods in their order."""
     return [line.label for line in series_of(groups)]
 
 
 def headline(groups: list[Group], rate: Callable[[Group], Rate]) -> Table:
-    """A rate of every cell: settings down, methods across."""
+    """Return a table of a rate of every cell: one row per setting, one column per method.
+
+    Args:
+        groups: groups of the run.
+        rate: the rate of a group.
+    """
     labels, known = labels_of(groups), {(group.setting, group.label): group for group in groups}
     rows: list[list[Entry]] = []
     for setting, name in settings_of(groups).items():
@@ -47,7 +52,7 @@ def headline(groups: list[Group], rate: Callable[[Group], Rate]) -> Table:
 
 
 def counts(groups: list[Group]) -> Table:
-    """Episodes, successes, contacts, starts that had no room for the obstacles, and failures as whole numbers."""
+    """Return a table of counts of every cell: episodes, successes, contacts, refused starts, and failures by reason."""
     names = settings_of(groups)
     reasons = [o for o in outcomes_of(groups) if o not in (SAFE, UNSAFE)]
     rows: list[list[Entry]] = []
@@ -71,7 +76,12 @@ def counts(groups: list[Group]) -> Table:
 
 
 def success_tests(groups: list[Group], tests: list[SuccessTest]) -> Table:
-    """Per setting and method: pairs that the reference alone won, those that the method alone won, and Holm's p."""
+    """Return a table of wins in pairs (reference only : method only) and Holm's p per setting and method.
+
+    Args:
+        groups: groups of the run.
+        tests: tests of success.
+    """
     known = {(test.setting, test.label): test for test in tests}
     labels = [label for label in labels_of(groups) if any(test.label == label for test in tests)]
     rows: list[list[Entry]] = []
@@ -87,7 +97,12 @@ def success_tests(groups: list[Group], tests: list[SuccessTest]) -> Table:
 
 
 def metric_tests(groups: list[Group], tests: list[MetricTest]) -> Table:
-    """Differences of metrics over pairs."""
+    """Return a table of paired differences of metrics.
+
+    Args:
+        groups: groups of the run.
+        tests: tests of metrics.
+    """
     names = settings_of(groups)
     rows: list[list[Entry]] = []
     for test in tests:
@@ -99,7 +114,13 @@ def metric_tests(groups: list[Group], tests: list[MetricTest]) -> Table:
 
 
 def metrics(groups: list[Group], names: list[str], title: str = "") -> Table:
-    """Interquartile means of some metrics of the groups of one task."""
+    """Return a table of interquartile means of some metrics.
+
+    Args:
+        groups: groups of one task.
+        names: names of the metrics.
+        title: title of a collapsed table; "": always shown.
+    """
     settings, rows = settings_of(groups), []
     for group in groups:
         values = [(METRICS[name].factor, group.values(name)) for name in names]
@@ -109,12 +130,17 @@ def metrics(groups: list[Group], names: list[str], title: str = "") -> Table:
 
 
 def known_metrics(groups: list[Group]) -> list[str]:
-    """Names of the metrics that any episode has."""
+    """Return the names of the metrics that have a value in any episode."""
     return [name for name in METRICS if any(len(group.values(name)) for group in groups)]
 
 
 def failures(groups: list[Group], videos: list[Video]) -> Table:
-    """The first failure of each kind of each method, with its video where there is one."""
+    """Return a table of the first failure of each kind of each method, preferring failures with a video.
+
+    Args:
+        groups: groups of the run.
+        videos: videos of failures.
+    """
     shown = {(video.cell, video.index): video for video in videos}
     names, total = settings_of(groups), Counter((g.label, o) for g in groups for o in g.outcomes.elements())
     rows: dict[tuple[str, str], list[Entry]] = {}
@@ -134,7 +160,12 @@ def failures(groups: list[Group], videos: list[Video]) -> Table:
 
 
 def every_failure(groups: list[Group], videos: list[Video]) -> Table:
-    """All failures of a few cells."""
+    """Return a table of all failures.
+
+    Args:
+        groups: the groups, typically of one cell.
+        videos: videos of failures.
+    """
     shown = {(video.cell, video.index): video for video in videos}
     rows: list[list[Entry]] = []
     for group in groups:
@@ -148,7 +179,7 @@ def every_failure(groups: list[Group], videos: list[Video]) -> Table:
 
 
 def unsafe_successes(groups: list[Group]) -> Table:
-    """The first unwanted contact of each kind in successes of each method."""
+    """Return a table of the first unwanted contact of each kind in successes of each method."""
     rows: dict[tuple[str, str], list[Entry]] = {}
     total = Counter((g.label, r.collision) for g in groups for r in g.records if outcome_of(r) == UNSAFE)
     for group in groups:
@@ -160,18 +191,18 @@ def unsafe_successes(groups: list[Group]) -> Table:
 
 
 def outcomes_of(groups: list[Group]) -> list[str]:
-    """All outcomes that occur, in the order of figures."""
+    """Return all outcomes that occur, in the order of figures."""
     found = {outcome for group in groups for outcome in group.outcomes}
     return [*(o for o in OUTCOMES if o in found), *sorted(found - set(OUTCOMES))]
 
 
 def words_of(outcome: str) -> str:
-    """An outcome in words."""
+    """Return an outcome in words."""
     return OUTCOMES[outcome][2] if outcome in OUTCOMES else outcome
 
 
 def timing(groups: list[Group]) -> Table:
-    """Times of the policy by task and method: medians over episodes, and the longest tick of all."""
+    """Return a table of the policy's times by task and method: medians over episodes, and the longest tick."""
     rows: list[list[Entry]] = []
     for (task, robot), some in groups_by_task(groups).items():
         for line in series_of(some):
@@ -193,7 +224,7 @@ def timing(groups: list[Group]) -> Table:
 
 
 def costs(groups: list[Group]) -> Table:
-    """What each method needs besides its episodes."""
+    """Return a table of what each method needs besides its episodes: demonstrations, training steps, tuned settings."""
     rows: list[list[Entry]] = []
     for method in sorted({group.cell.method for group in groups}, key=place_of):
         settings = [group.cell.settings for group in groups if group.cell.method == method]
@@ -216,7 +247,7 @@ def _leaves(settings: object) -> int:
 
 
 def number(value: float) -> str:
-    """Three significant digits, none wasted; a dash for what is no number."""
+    """Return a number with three significant digits and at most four decimals; a dash for NaN."""
     if math.isnan(value):
         return NOTHING
     if value == 0.0 or abs(value) >= 99.95:
@@ -226,5 +257,5 @@ def number(value: float) -> str:
 
 
 def p_words(value: float) -> str:
-    """A p-value as papers print it."""
+    """Return a p-value as printed in papers."""
     return NOTHING if math.isnan(value) else "< 0.001" if value < 0.001 else f"{value:.3f}"

@@ -1,4 +1,4 @@
-"""The numbers of a report as CSV: one row per episode, one row per cell."""
+"""Numbers of a report as CSV: one row per episode, one row per cell."""
 
 from __future__ import annotations
 
@@ -22,7 +22,15 @@ RATES = ("success", "safe_success")
 
 
 def write_tables(run: Run, output: Path) -> list[Path]:
-    """Write `episodes.csv` and `summary.csv`; the files written."""
+    """Write `episodes.csv` and `summary.csv`.
+
+    Args:
+        run: the run.
+        output: folder of the report.
+
+    Returns:
+        The files written.
+    """
     groups = groups_of(run)
     episodes, summary = output / "episodes.csv", output / "summary.csv"
     head = [*EPISODE_WORDS, *EPISODE_NUMBERS, *EPISODE_ENDS, *METRICS, *TICKS]
@@ -76,7 +84,7 @@ def _cell(group: Group) -> list[Any]:
 
 
 def _value(value: Any) -> Any:
-    """Flags as 0 and 1, numbers to nine digits, nothing for what is not known."""
+    """Return a value as text for CSV: flags as 0 and 1, numbers with nine digits, "" for None."""
     if value is None:
         return ""
     return int(value) if isinstance(value, bool) else f"{value:.9g}" if isinstance(value, float) else value

@@ -1,1 +1,1 @@
-"""`onedemo reproduce`: the paper's experiments."""
+"""`onedemo reproduce`: the paper's experiments on one page."""

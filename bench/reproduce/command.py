@@ -1,12 +1,12 @@
 """`onedemo reproduce`: the paper's experiments one by one, and one page about them.
 
-| in the folder | what |
+| file | content |
 |---|---|
-| `reproduce.md`, `reproduce.html` | results, figures, and what agrees with the paper; the second is whole in itself |
+| `reproduce.md`, `reproduce.html` | results, figures and agreement with the paper; the HTML page is self-contained |
 | `times.csv`, `trees.csv` | the times |
-| `figures/`, `videos/` | of the first seed of each experiment |
-| `runs/` | run folders, see `run_folder` |
-| `trees.json` | the times of the escape trees, and what they are of |
+| `figures/`, `videos/` | figure and video of the first seed of each experiment |
+| `runs/` | run folders; see `run_folder` |
+| `trees.json` | times of the escape trees, and a digest of their scenes |
 """
 
 from __future__ import annotations
@@ -20,10 +20,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ...configs.grid import load_grid
+from ...configs import BadConfig, load_grid, shipped_config
 from ...configs.run_config import digest_of
-from ...configs.shipped_files import shipped_config
-from ...planner.errors import BadConfig
 from ..atomic_files import write_whole
 from ..console import COMMAND_LINE, console
 from ..episodes.run_folder import FIGURE, VIDEO, written_json
@@ -35,17 +33,20 @@ RUNS, FIGURES, VIDEOS, TREES = "runs", "figures", "videos", "trees.json"
 
 
 def reproduce(names: Iterable[str], output: Path, *, episodes: int | None = None, video: bool = True) -> int:
-    """Do what is missing of the experiments, and write the page about all that are finished; the exit code.
+    """Run the missing parts of the experiments, and write the page about all finished ones.
 
     Args:
-        names: of experiments; none: all.
-        output: the folder.
-        episodes: seeds of each; None: each experiment's own.
-        video: whether videos are made.
+        names: names of experiments; empty: all experiments.
+        output: folder of the page.
+        episodes: seeds per experiment; None: each experiment's own number.
+        video: record videos.
+
+    Returns:
+        The exit code.
 
     Raises:
-        UnknownName: no such experiment; the message lists them.
-        BadConfig: the folder cannot be made.
+        UnknownName: no such experiment; the message lists all names.
+        BadConfig: the folder cannot be created.
     """
     wanted, err = experiments_named(names), console(stderr=True)
     try:
@@ -70,20 +71,41 @@ def reproduce(names: Iterable[str], output: Path, *, episodes: int | None = None
 
 
 def changes(experiment: Experiment, episodes: int | None, *, video: bool) -> list[str]:
-    """What an experiment changes in its config."""
+    """Return an experiment's overrides of its config.
+
+    Args:
+        experiment: the experiment.
+        episodes: number of seeds; None: the experiment's own number.
+        video: record videos.
+    """
     count = experiment.episodes if episodes is None else episodes
     own = [f"name={experiment.name}", f"episodes={count}", f"video={str(video).lower()}"]
     return [*own, *experiment.overrides]
 
 
 def run_folder_of(experiment: Experiment, output: Path, episodes: int | None) -> Path:
-    """Where an experiment's run is."""
+    """Return the run folder of an experiment.
+
+    Args:
+        experiment: the experiment.
+        output: folder of the page.
+        episodes: see `changes`.
+    """
     grid = load_grid(shipped_config(experiment.config), changes(experiment, episodes, video=True))
     return output / RUNS / f"{grid.name}-{grid.digest()}"
 
 
 def finished(each: Experiment | Drawing, output: Path, episodes: int | None) -> Finished | None:
-    """What an experiment gave, its pictures put beside the page; None if it has not been done."""
+    """Return the results of an experiment, with its pictures and video copied next to the page.
+
+    Args:
+        each: the experiment or drawing.
+        output: folder of the page.
+        episodes: see `changes`.
+
+    Returns:
+        The results; None if the experiment has not been run.
+    """
     if isinstance(each, Drawing):
         rows = written_json(output, TREES).get("rows")
         pictures = [f"{FIGURES}/{each.name}_{scene}.png" for scene in each.scenes]
@@ -102,14 +124,19 @@ def finished(each: Experiment | Drawing, output: Path, episodes: int | None) -> 
 
 
 def _copied(source: Path, target: Path) -> bool:
-    """Copy a file if it is there; whether it is."""
+    """Copy a file if it exists; return whether it does."""
     if source.is_file():
         shutil.copyfile(source, target)
     return source.is_file()
 
 
 def draw_trees(drawing: Drawing, output: Path) -> None:
-    """Draw the scenes of a drawing with all planes and time their trees, unless that was done before."""
+    """Draw a drawing's scenes with all planes and time their trees, unless that was done before.
+
+    Args:
+        drawing: the drawing.
+        output: folder of the page.
+    """
     from ...configs.plan_scene import shipped_scene
 
     texts = [shipped_scene(scene).read_text(encoding="utf-8") for scene in drawing.scenes]
@@ -127,12 +154,12 @@ def draw_trees(drawing: Drawing, output: Path) -> None:
 
 def _drawn(scene: str, picture: Path, repeats: int) -> dict[str, Any]:
     from ...configs.plan_scene import load_scene, shipped_scene
-    from ...planner.judge.certify import certify
+    from ...planner import certify
     from ..plan.command import plan_in
     from ..plan.figure import draw_plan
     from ..plan.tree_times import timed_tree
 
     planned = plan_in(load_scene(shipped_scene(scene)))
-    certificate = certify(planned.log)
+    certificate = certify(planned.plan.log())
     draw_plan(planned, certificate, [picture, picture.with_suffix(".pdf")], every_plane=True)
     return {**asdict(timed_tree(planned, repeats)), "judged": certificate.ok}

@@ -1,4 +1,4 @@
-"""The paper's experiments, as data: what is run for each, and what is known of how the paper did it.
+"""The paper's experiments as data: config and overrides, what the paper did, and what differs here.
 
 Paper: section IV. It prints no success rates, no sizes of the obstacles, and no units for some of its times.
 """
@@ -11,21 +11,21 @@ from dataclasses import dataclass
 from ...planner.errors import UnknownName
 
 EPISODES = 10
-"""Seeds of an experiment."""
+"""Number of seeds per experiment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """A task done again and again.
+    """Task repeated over several seeds.
 
     Attributes:
-        name: short.
-        title: for headings.
+        name: short name.
+        title: title for headings.
         config: name of a shipped config.
         overrides: `key=value` changes to it.
-        episodes: how many seeds.
-        paper: what the paper did.
-        here: what is different here whatever comes out.
+        episodes: number of seeds.
+        paper: the experiment in the paper.
+        here: differences from the paper, whatever the result.
     """
 
     name: str
@@ -39,15 +39,15 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """Escape trees in shipped scenes: drawn with all their planes, and timed.
+    """Escape trees in shipped scenes, drawn with all their planes and timed.
 
     Attributes:
-        name: short.
-        title: for headings.
+        name: short name.
+        title: title for headings.
         scenes: names of shipped scenes.
-        repeats: how often each tree is grown for the times.
-        paper: what the paper shows.
-        here: what is different here.
+        repeats: number of time samples per tree.
+        paper: the content of the paper.
+        here: differences from the paper.
     """
 
     name: str
@@ -139,10 +139,10 @@ EXPERIMENTS = (
 
 
 def experiments_named(names: Iterable[str]) -> list[Experiment | Drawing]:
-    """The experiments of these names in their own order; of none: all.
+    """Return the experiments with these names, in the order of `EXPERIMENTS`; all of them if there are no names.
 
     Raises:
-        UnknownName: there is none of a name; the message lists them.
+        UnknownName: an unknown name; the message lists all names.
     """
     known = {each.name: each for each in EXPERIMENTS}
     wanted = list(names)

@@ -1,4 +1,4 @@
-"""The page of `onedemo reproduce`: what was measured, and what of it agrees with the paper."""
+"""Page of `onedemo reproduce`: the measurements, and their agreement with the paper."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ TREES_SAID = (
     "Mean +- standard deviation of the processor's time; the whole plan once, by the clock. The table: trees.csv."
 )
 LEVEL_MS, LEVEL_MS_STD, LOOP_MS = 0.0429, 0.0109, 0.1
-"""What the paper prints, in C++: a level of the tree, and an upper bound of a loop of the controller [ms]."""
+"""Times [ms] printed in the paper, in C++: a level of the tree (mean, standard deviation), and an upper bound of a
+controller loop."""
 TIMES = ("experiment", "episodes", "tick_us_median", "tick_us_p99", "tick_us_max", "motion_s_median", "motion_s_max")
 TREE_TIMES = (
     "scene", "planes", "levels", "plane_ms", "plane_ms_std", "detour_ms", "detour_ms_std", "detour_level_ms",
@@ -35,13 +36,13 @@ Row = dict[str, Any]
 
 
 class Finished(NamedTuple):
-    """An experiment that has been done.
+    """Results of a finished experiment.
 
     Attributes:
-        experiment: which.
-        rows: its rows of `summary.json`, or of the times of trees.
-        pictures: paths from the page.
-        video: path from the page, "" if there is none.
+        experiment: the experiment.
+        rows: its rows of `summary.json`, or of the trees' times.
+        pictures: paths relative to the page.
+        video: path relative to the page; "" if there is none.
     """
 
     experiment: Experiment | Drawing
@@ -51,12 +52,15 @@ class Finished(NamedTuple):
 
 
 def write_page(output: Path, found: Sequence[Finished], took: str) -> list[Path]:
-    """Write the page, as Markdown and as HTML, and the tables of times; the two pages.
+    """Write the page as Markdown and HTML, and the tables of times.
 
     Args:
-        output: the folder.
-        found: all that is finished.
-        took: how long the last command took, and how busy the machine was.
+        output: folder of the page.
+        found: all finished experiments.
+        took: duration of the last command and load of the machine.
+
+    Returns:
+        The two pages.
     """
     runs = [each for each in found if isinstance(each.experiment, Experiment)]
     trees = [each for each in found if isinstance(each.experiment, Drawing)]
@@ -76,7 +80,7 @@ def write_page(output: Path, found: Sequence[Finished], took: str) -> list[Path]
 
 
 def results_table(runs: Sequence[Finished]) -> Table:
-    """A line for each experiment."""
+    """Return the table of results, with a row per experiment."""
     head = ["experiment", "success", "Wilson 95 %", "no unwanted contact", "obstacle touched", "nearest [mm]"]
     rows: list[list[Entry]] = []
     for each in runs:
@@ -91,7 +95,7 @@ def results_table(runs: Sequence[Finished]) -> Table:
 
 
 def _largest_error(row: Row) -> str:
-    """Number, unit and of what, short enough for a line of a table."""
+    """Return value, unit and name of an error, short enough for a cell of the table."""
     what, _, unit = row["error"].rpartition(" [")
     for word in ("largest ", "share of "):
         what = what.removeprefix(word)
@@ -126,7 +130,7 @@ def _section(each: Finished, output: Path) -> list[Block]:
 
 
 def run_agrees(row: Row) -> str:
-    """What agrees with the paper, from the numbers of a run."""
+    """Return a sentence on how a run agrees with the paper."""
     done, count = row["successes"], row["episodes"]
     failures = ", ".join(f"{reason} {times}" for reason, times in row["failures"].items())
     if done == count:
@@ -143,7 +147,7 @@ def run_agrees(row: Row) -> str:
 
 
 def trees_agree(rows: Sequence[Row]) -> str:
-    """What agrees with the paper, from the times of the trees."""
+    """Return a sentence on how the trees' times agree with the paper."""
     judged = sum(row["judged"] for row in rows)
     planes, levels = ([row[key][0] for row in rows] for key in ("plane_ms", "detour_level_ms"))
     verdict = "Agrees" if judged == len(rows) else f"Agrees in {judged} of {len(rows)} scenes"
@@ -168,7 +172,7 @@ def _tree_table(rows: Sequence[Row]) -> Table:
 
 
 def _times(runs: Sequence[Finished]) -> list[Block]:
-    """Planner's time and motion's time, kept apart."""
+    """Return the table of planning times and, separately, motion times."""
     head = ["experiment", "tick, median [us]", "tick, p99 [us]", "longest [ms]", "motion, median [s]", "longest [s]"]
     rows: list[list[Entry]] = []
     for each in runs:
@@ -189,7 +193,7 @@ def _times(runs: Sequence[Finished]) -> list[Block]:
 
 
 def time_row(each: Finished) -> Row:
-    """A row of `times.csv`."""
+    """Return a row of `times.csv`."""
     row = each.rows[0]
     keys = ("tick_us_median", "tick_us_p99", "tick_us_max", "seconds_median", "seconds_max")
     values = (each.experiment.name, row["episodes"], *(row[key] for key in keys))
@@ -197,7 +201,7 @@ def time_row(each: Finished) -> Row:
 
 
 def tree_row(row: Row) -> Row:
-    """A row of `trees.csv`."""
+    """Return a row of `trees.csv`."""
     times = [value for key in ("plane_ms", "detour_ms", "detour_level_ms") for value in row[key]]
     return dict(zip(TREE_TIMES, (row["scene"], row["planes"], row["levels"], *times, row["plan_ms"]), strict=True))
 

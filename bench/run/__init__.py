@@ -1,1 +1,1 @@
-"""`onedemo run`: a comparison in a folder."""
+"""`onedemo run`: a comparison of methods, kept in a run folder."""

@@ -1,22 +1,22 @@
-"""Which actors a run uses: written into its cells, so that another actor under the same name is another run."""
+"""Actor identities in the cells of a run: another actor under the same name makes another run."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from ...baselines.factory import POLICIES
-from ...baselines.learning.actor_files import foreign, load_actor
+from ...baselines import POLICIES, load_actor
+from ...baselines.errors import BadActor
+from ...baselines.learning.actor_files import foreign
 from ...baselines.learning.learned_policy import DIGITS, LearnedSettings, actor_file, sha256_of
-from ...configs.grid import Grid
-from ...configs.run_config import RunConfig
-from ...planner.errors import BadActor, BadConfig, BadOption
+from ...configs import BadConfig, Grid, RunConfig
+from ...planner.errors import BadOption
 
 
 def with_actors(grid: Grid) -> Grid:
-    """The grid with what its cells' actors are: SHA-256 and how long they were trained.
+    """Return the grid with the SHA-256 and the training steps of the actor of every learned cell.
 
     Raises:
-        BadConfig: there is no such actor, it cannot be read, or it is not the one that the config means.
+        BadConfig: an actor does not exist, cannot be read, or has another SHA-256 than the config demands.
     """
     return replace(grid, cells=tuple(_with_actor(cell, grid) for cell in grid.cells))
 
@@ -27,7 +27,7 @@ def _with_actor(cell: RunConfig, grid: Grid) -> RunConfig:
     source = grid.blame("settings")
     try:
         path = actor_file(cell.method, cell.task, cell.robot, str(cell.settings.get("checkpoint", "")))
-        # a clone's steps are of the gradient
+        # behavior cloning counts gradient steps, not environment steps
         steps = 0 if foreign(path) or cell.method == "bc" else load_actor(path).training.steps
     except (BadActor, BadOption) as error:
         reason = error.reason if isinstance(error, BadOption) else str(error)

@@ -1,4 +1,4 @@
-"""`onedemo run`: a config in, a run folder out; interrupted runs go on where they stopped."""
+"""`onedemo run`: a config in, a run folder out; interrupted runs continue where they stopped."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ...configs.grid import load_grid
-from ...configs.shipped_files import shipped_config
-from ...planner.errors import BadConfig
+from ...configs import BadConfig, load_grid, shipped_config
 from ..console import console
 from ..episodes.run_folder import LOG, alone, describe, merge, open_folder, parsed_shard, recorded
 from ..episodes.scenarios import read_suite
@@ -35,15 +33,18 @@ def run_config(
     retry: bool = False,
     quiet: bool = False,
 ) -> int:
-    """Run a config and write its folder; returns the exit code.
+    """Run a config and write its run folder.
 
     Args:
-        config: a file, or the name of a shipped config.
-        overrides: `key=value` changes.
-        output: where the run folder is made.
-        shard: part i of n of the episodes, as "i/n"; None: all of them.
-        retry: run again the episodes that were lost with their workers.
-        quiet: print only the folder, and errors.
+        config: config file, or the name of a shipped config.
+        overrides: `key=value` changes to the config.
+        output: parent folder of the run folder.
+        shard: part i of n of the episodes, as "i/n"; None: all episodes.
+        retry: rerun the episodes that were lost with their workers.
+        quiet: print only the run folder and errors.
+
+    Returns:
+        The exit code.
 
     Raises:
         BadConfig: the config, an override or the demonstration cannot be used.
@@ -66,7 +67,11 @@ def run_config(
 
 
 def config_path(config: str) -> Path:
-    """The file itself, or the shipped config of that name, also for a path as it stands in the source tree."""
+    """Return the path of a config file, or of the shipped config with this name or source-tree path.
+
+    Raises:
+        BadConfig: no such file.
+    """
     path = Path(config)
     if path.exists():
         return path
@@ -76,14 +81,14 @@ def config_path(config: str) -> Path:
 
 
 def _completed(comparison: Comparison, err: Any) -> list[str]:
-    """Run what is missing, and report if nothing is; the lines for the terminal."""
+    """Run the missing episodes and, once none is missing, write the report; return the lines for the terminal."""
     grid, folder, shard = comparison.grid, comparison.folder, comparison.shard
     episodes = sum(cell.episodes for cell in grid.cells)
     with executor_for(grid.settings, EpisodeJobs, episodes, folder / LOG) as executor:
         comparison.complete(executor)
         suite = read_suite(folder)
         assert suite
-        # other parts may have been finished meanwhile
+        # other shards may have finished in the meantime
         records, _ = recorded(folder, grid.cells, suite)
         missing = sum(len(suite.feasible(cell)) for cell in grid.cells) - len(records)
         if missing:

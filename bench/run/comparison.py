@@ -1,4 +1,4 @@
-"""A comparison being completed: what is missing is run, every finished episode is written at once."""
+"""Completion of a comparison: missing episodes are run, and every record is written as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...configs.grid import Grid
-from ...configs.run_config import CELL_KEYS, RunConfig
-from ...planner.errors import BadConfig, OneDemoError
+from ...configs import BadConfig, Grid, RunConfig
+from ...configs.run_config import CELL_KEYS, cell_of
+from ...planner.errors import OneDemoError
 from ..episodes.episode_records import EpisodeRecord, RecordWriter, known_record
 from ..episodes.run_folder import LOG, WHOLE, Shard, alone, recorded
 from ..episodes.scenarios import Suite, frozen, lists_of, read_suite, scenarios_of
@@ -18,32 +18,33 @@ from .episode_jobs import lost_record
 from .run_progress import RunProgress
 
 DRAWN_AT_ONCE = 10
-"""Scenarios of a drawing job."""
+"""Number of scenarios per drawing job."""
 Records = dict[tuple[str, int], EpisodeRecord]
+"""Episode records by cell digest and scenario index."""
 
 
 class Comparison:
-    """The run of a grid in its folder.
+    """Run of a grid in its run folder.
 
     Args:
-        grid: the cells.
-        folder: of the run; held by this process.
-        board: where progress is shown.
-        shard: the part of it that is run here.
-        retry: run again what was lost with its worker.
+        grid: the cells to compare.
+        folder: run folder, locked by this process.
+        board: progress display.
+        shard: the part of the episodes that is run here.
+        retry: rerun the episodes that were lost with their workers.
     """
 
     def __init__(self, grid: Grid, folder: Path, board: RunProgress, shard: Shard = WHOLE, *, retry: bool = False):
         self.grid, self.folder, self.shard, self.board, self.retry = grid, folder, shard, board, retry
 
     def complete(self, executor: Executor) -> Records:
-        """Draw the scenarios if that has not been done, run what is missing; all episodes that are finished.
+        """Draw the scenarios if necessary, run the missing episodes and return the records of all finished ones.
 
         Raises:
-            BadConfig: a cell cannot be.
+            BadConfig: a cell cannot be run.
             ScenarioChanged: the environment draws other starts than the frozen ones.
-            WorkerFailed: workers die, or cannot do their work.
-            OSError: the disk is full.
+            WorkerFailed: workers died twice or crashed.
+            OSError: a file cannot be written (disk full).
         """
         suite = read_suite(self.folder)
         if suite is None:
@@ -64,12 +65,17 @@ class Comparison:
         return records
 
     def mine(self, suite: Suite) -> list[tuple[RunConfig, int]]:
-        """Cell and index of the episodes of this part."""
+        """Return cell and scenario index of every episode of this shard."""
         every = [(cell, each.index) for cell in self.grid.cells for each in suite.feasible(cell)]
         return every[self.shard.index - 1 :: self.shard.count]
 
     def missing(self, suite: Suite, records: Records) -> list[tuple[RunConfig, int]]:
-        """Those of them that are not finished."""
+        """Return cell and scenario index of the unfinished episodes of this shard.
+
+        Args:
+            suite: the frozen scenarios.
+            records: the finished episodes.
+        """
         return [(cell, index) for cell, index in self.mine(suite) if (cell.digest(), index) not in records]
 
     def _drawn_suite(self, executor: Executor) -> Suite:
@@ -94,7 +100,7 @@ class Comparison:
         return suite
 
     def _prepare(self, executor: Executor, cells: Iterable[RunConfig]) -> None:
-        """Build everything that is needed, so that what cannot be is refused before anything runs."""
+        """Build environments and policies of all cells, so that unusable cells are refused before any episode runs."""
         jobs = [{"kind": "prepare", "cell": cell.model_dump(mode="json")} for cell in cells]
         with self.board.waiting("building the scenes and the planner (compiled on first use: about a minute)"):
             for _ in self._answers(executor, jobs):
@@ -119,10 +125,10 @@ class Comparison:
         return {"kind": "episode", "cell": cell.model_dump(mode="json"), "index": index, **start, "trajectories": kept}
 
     def _record(self, outcome: Outcome) -> EpisodeRecord:
-        """The record of an episode, also of one that its worker did not survive twice."""
+        """Return the record of an episode, also if the episode was lost with its worker twice."""
         if not outcome.lost:
             return known_record(self._checked(outcome)["record"])
-        config, index = RunConfig.model_validate(outcome.job["cell"]), outcome.job["index"]
+        config, index = cell_of(outcome.job["cell"]), outcome.job["index"]
         scenario = scenarios_of(config)[index]
         how = f"took more than {outcome.seconds:.0f} s of real time" if outcome.lost == HUNG else "died"
         self.board.warn(f"{self.grid.label(config)}, seed {scenario.seed}: the worker {how}, twice; see {LOG}")
@@ -134,8 +140,8 @@ class Comparison:
             yield outcome.job, self._checked(outcome)
 
     def _checked(self, outcome: Outcome) -> Answer:
-        """The answer, unless the work cannot go on."""
-        config = RunConfig.model_validate(outcome.job["cell"])
+        """Return the answer to a job; raise if the run cannot continue."""
+        config = cell_of(outcome.job["cell"])
         cell = f"in the cell {self.grid.label(config)}"
         if outcome.answer is None:
             how = "died" if outcome.lost == WORKER_DIED else "hung"
@@ -147,7 +153,7 @@ class Comparison:
         return outcome.answer
 
     def _refusal(self, config: RunConfig, answer: Answer) -> OneDemoError:
-        """The error with the key of the config that is to blame, and a way out."""
+        """Return the error for a refused job, with the config key to blame and a way out."""
         key, reason = answer["key"], answer["refused"]
         if not key:
             return OneDemoError(reason)

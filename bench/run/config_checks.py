@@ -1,4 +1,4 @@
-"""What can be said of a config before anything is built: names, demonstrations, arguments and settings."""
+"""Checks of a config before anything is built: names, demonstrations, arguments and settings."""
 
 from __future__ import annotations
 
@@ -8,24 +8,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...baselines.own_policy import is_own
-from ...configs.grid import Grid
-from ...configs.run_config import RunConfig
-from ...planner.errors import BadConfig, BadDemonstration
+from ...configs import BadConfig, Grid, RunConfig
+from ...planner.errors import BadDemonstration
 from ..task_table import TASKS
 
 if TYPE_CHECKING:
-    from ...planner.imitation.demonstration import Demonstration
+    from ...planner import Demonstration
 
 OWN_KEYS = ("robot", "level", "obstacles", "render_mode")
-"""Arguments of environments that are keys of a config themselves."""
+"""Environment arguments that are config keys of their own."""
 
 
 def check_grid(grid: Grid) -> None:
-    """Refuse what cannot be run.
+    """Refuse a grid with cells that cannot be run.
 
     Raises:
-        BadConfig: an unknown name, argument or setting; with the file, or the command line, and the key.
-        BadDemonstration: a demonstration is of something else.
+        BadConfig: an unknown name, argument or setting; names the key and its file (or the command line).
+        BadDemonstration: a demonstration is unreadable or belongs to another task.
         UnknownName: no such demonstration is shipped.
     """
     known = known_names()
@@ -45,16 +44,26 @@ def check_grid(grid: Grid) -> None:
 
 
 def known_names() -> dict[str, Iterable[str | None]]:
-    """For the keys whose values are names, the known ones."""
-    from ...baselines.factory import POLICIES
-    from ...envs.core.levels import LEVELS, OBSTACLES
-    from ...envs.scene.robots import ROBOTS
+    """Return the allowed values of every config key whose values are names."""
+    from ...baselines import POLICIES
+    from ...envs import LEVELS, ROBOTS
+    from ...envs.core.levels import OBSTACLES
 
     return {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
 
 
 def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterable[str | None]]) -> None:
-    """Refuse a name that is not among the known ones of its key; a policy of one's own is none of them."""
+    """Refuse an unknown name; dotted paths of users' own policies pass.
+
+    Args:
+        source: file or place to blame in the message.
+        key: config key.
+        value: value of the key.
+        known: allowed values by key; keys without an entry pass.
+
+    Raises:
+        BadConfig: the name is unknown.
+    """
     if key == "method" and isinstance(value, str) and is_own(value):
         return
     if key in known and value not in list(known[key]):
@@ -66,7 +75,15 @@ def _check_arguments(cell: RunConfig, grid: Grid) -> None:
 
 
 def check_env(cell: RunConfig, source: str | Path) -> None:
-    """Refuse arguments that the environment does not know."""
+    """Refuse arguments that the cell's environment does not accept.
+
+    Args:
+        cell: the cell.
+        source: file or place to blame in the message.
+
+    Raises:
+        BadConfig: an unknown argument.
+    """
     import gymnasium as gym
     from gymnasium.envs.registration import load_env_creator
 
@@ -84,7 +101,7 @@ def check_env(cell: RunConfig, source: str | Path) -> None:
 
 
 def _check_settings(cell: RunConfig, grid: Grid) -> None:
-    """Refuse settings that the method does not know, and another frame of the hand for what is no method of ours."""
+    """Refuse settings that the method lacks, and the key `tool` for users' own policies."""
     from ...baselines.factory import OWN_TOOL, settings_of
 
     if is_own(cell.method):
@@ -100,18 +117,18 @@ def _check_settings(cell: RunConfig, grid: Grid) -> None:
 
 
 def fitting_demonstration(cell: RunConfig) -> Demonstration:
-    """The demonstration of a cell.
+    """Return the demonstration of a cell, checked against the cell's task.
 
     Raises:
-        BadDemonstration: it cannot be read, or is of something else.
+        BadDemonstration: the file is unreadable, belongs to another task or lacks a segment.
         UnknownName: no such demonstration is shipped.
     """
     from ...baselines.screw_policy import PROGRAMS
+    from ...configs import load_demonstration
     from ...configs.shipped_files import demonstration_path
-    from ...planner.imitation.demonstration_files import load_demonstration
 
     file = demonstration_path(cell.demonstration)
-    demonstration = load_demonstration(file)
+    demonstration = load_demonstration(cell.demonstration)
     task, segments = TASKS[cell.task].demonstrated_task or cell.task, PROGRAMS[cell.task].SEGMENTS
     if demonstration.task != task:
         raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")

@@ -1,16 +1,16 @@
-"""What a worker does: it keeps environments and policies, and runs in them what it is asked for.
+"""Job handler for episodes: caches environments and policies, and runs jobs in them.
 
-A job and its answer are mappings that JSON can hold, so that any process may do the work:
+Jobs and answers are JSON mappings, so that any process can do the work:
 
-| job | besides "cell" | answer |
+| job | keys besides "cell" | answer |
 |---|---|---|
 | "prepare" | | {} |
-| "draw" | "indices" | "drawn": per index a start, or why there is none |
+| "draw" | "indices" | "drawn": per index a start, or the reason why there is none |
 | "episode" | "index", "start", "scenario", "trajectories" (a folder or null) | "record" |
-| "show" | "folder" | what `show` returns |
-| "film" | "folder", "record" | "problem": why there is no video of it, or "" |
+| "show" | "folder" | see `show` |
+| "film" | "folder", "record" | "problem": why there is no video, or "" |
 
-What the user got wrong, or must know, is answered by {"refused": text, "key": key}.
+Mistakes of the user are answered by {"refused": text, "key": key}.
 """
 
 from __future__ import annotations
@@ -24,9 +24,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...configs.run_config import RunConfig
-from ...planner.errors import BadConfig, BadOption, NoRoom, OneDemoError
-from ...planner.geometry.pose import Pose
+from ...configs import BadConfig, RunConfig
+from ...configs.run_config import cell_of
+from ...envs.errors import NoRoom
+from ...planner import Pose
+from ...planner.errors import BadOption, OneDemoError
 from ..episodes.episode_records import EpisodeRecord, known_record
 from ..episodes.run_folder import FIGURE, VIDEO
 from ..episodes.scenarios import Scenario, ScenarioChanged, scenarios_of
@@ -36,23 +38,23 @@ from ..workers.dispatcher import ERROR, Answer, Job
 from ..workers.worker_process import main
 
 if TYPE_CHECKING:
-    from ...baselines.policy import Policy
+    from ...baselines import Policy
 
 LOG = logging.getLogger("onedemo")
 MAX_ENVIRONMENTS, MAX_POLICIES = 4, 32
-"""What a worker keeps."""
+"""Cache sizes of a worker."""
 
 
 class EpisodeJobs:
-    """Does the jobs of real runs."""
+    """Job handler of `onedemo run`."""
 
     def __init__(self) -> None:
         self._environments: OrderedDict[str, Any] = OrderedDict()
         self._policies: OrderedDict[str, Policy] = OrderedDict()
 
     def do(self, job: Job) -> Answer:
-        """The answer to a job."""
-        config = RunConfig.model_validate(job["cell"])
+        """See `JobHandler`."""
+        config = cell_of(job["cell"])
         try:
             env, policy = self.prepared(config)
             if job["kind"] == "draw":
@@ -68,11 +70,11 @@ class EpisodeJobs:
             return refusal(error)
 
     def prepared(self, config: RunConfig) -> tuple[Any, Policy]:
-        """The environment and the policy of a cell, compiled and warm, from the ones that are kept if possible.
+        """Return the warm environment and policy of a cell, from the cache if possible.
 
         Raises:
-            BadConfig: the config names something wrongly; with its key.
-            BadDemonstration: the demonstration is of something else.
+            BadConfig: an unknown name or unusable value in the config, with its key.
+            BadDemonstration: the demonstration belongs to another task.
         """
         place = environment_key(config)
         if place not in self._environments:
@@ -97,30 +99,35 @@ class EpisodeJobs:
 
 
 def refusal(error: OneDemoError) -> Answer:
-    """What the user got wrong, with the key of the config if one is to blame."""
+    """Return the answer for a mistake of the user, with the config key to blame or ""."""
     if isinstance(error, BadOption):
         return {"refused": error.reason, "key": error.option}
     return {"refused": str(error), "key": ""}
 
 
 def environment_key(config: RunConfig) -> str:
-    """What environments differ in; the level is given to `reset`."""
+    """Return the cache key of a config's environment; the level is absent, it is an option of `reset`."""
     return repr((config.task, config.robot, config.obstacles, sorted(config.env.items()), config.max_seconds))
 
 
 def action_limit(config: RunConfig) -> int:
-    """The time limit of an episode in actions."""
+    """Return the time limit of an episode in actions."""
     from ...envs import IDS
 
     kind = IDS[TASKS[config.task].id]
     seconds = kind.seconds if config.max_seconds is None else config.max_seconds
-    # what is no frequency is refused by the environment
+    # the environment refuses invalid frequencies
     rate = config.env.get("control_frequency", kind.frequency)
     return max(1, round(seconds * rate)) if isinstance(rate, int) else kind.steps
 
 
 def made(config: RunConfig, render_mode: str | None = None) -> Any:
-    """The environment of a config."""
+    """Build the environment of a config and warm up the planner for it.
+
+    Args:
+        config: config of the cell.
+        render_mode: see `gymnasium.make`.
+    """
     import gymnasium as gym
 
     from ... import envs  # noqa: F401  (registers the ids)
@@ -142,8 +149,18 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
 
 
 def policy_for(env: Any, config: RunConfig) -> Policy:
-    """The policy of a config for its environment."""
-    from ...baselines.factory import make_policy
+    """Build the policy of a config.
+
+    Args:
+        env: environment of the config.
+        config: config of the cell.
+
+    Raises:
+        BadDemonstration: the demonstration belongs to another task.
+        BadConfig: a setting cannot be used.
+        BadOption: a setting does not fit the task.
+    """
+    from ...baselines import make_policy
     from .config_checks import fitting_demonstration
 
     shown, tool = fitting_demonstration(config), None
@@ -154,7 +171,13 @@ def policy_for(env: Any, config: RunConfig) -> Policy:
 
 
 def draw(env: Any, config: RunConfig, index: int) -> Answer:
-    """A start of a cell, with how often one was refused; or why there is none."""
+    """Draw the start of a scenario, with the number of rejected layouts; if there is none, return the reason.
+
+    Args:
+        env: environment of the config.
+        config: config of the cell.
+        index: index of the scenario.
+    """
     from ..episodes.start_states import drawn_start
 
     scenario = scenarios_of(config)[index]
@@ -166,7 +189,13 @@ def draw(env: Any, config: RunConfig, index: int) -> Answer:
 
 
 def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRecord:
-    """The record of an episode; what the policy raises is a failure of its own.
+    """Run an episode and return its record; an exception of the policy is recorded as a failure.
+
+    Args:
+        env: environment of the config.
+        policy: policy of the config.
+        config: config of the cell.
+        job: see the module.
 
     Raises:
         ScenarioChanged: the environment draws another start than the frozen one.
@@ -200,7 +229,15 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRec
 
 
 def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str, seconds: float) -> EpisodeRecord:
-    """What is written of an episode that the simulator could not judge: a failure, not known to be safe."""
+    """Return the record of an episode that the simulator could not judge: a failure, not counted as safe.
+
+    Args:
+        config: config of the cell.
+        scenario: scenario of the episode.
+        reason: `ERROR`, `WORKER_DIED` or `HUNG`.
+        detail: explanation for the reader.
+        seconds: real time [s] spent.
+    """
     return EpisodeRecord(
         index=scenario.index,
         seed=scenario.seed,
@@ -226,7 +263,13 @@ def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str,
 
 
 def shown(policy: Policy, config: RunConfig, folder: Path) -> Answer:
-    """Draw the first scenario; what a report must know of the pictures, or why there is no figure."""
+    """Call `show`; if it fails, answer with the reason why there is no figure.
+
+    Args:
+        policy: policy of the config.
+        config: config of the cell.
+        folder: run folder.
+    """
     try:
         return show(policy, config, folder)
     except Exception as error:
@@ -235,7 +278,13 @@ def shown(policy: Policy, config: RunConfig, folder: Path) -> Answer:
 
 
 def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
-    """Figure and, if wanted, video of the first scenario in a folder; what a report must know of them."""
+    """Draw figure and, if wanted, video of the first scenario; return the report's data on them.
+
+    Args:
+        policy: policy of the config.
+        config: config of the cell.
+        folder: run folder.
+    """
     from ..episodes.episode_figure import draw_episode
     from ..episodes.first_episode import watch
 
@@ -254,7 +303,14 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
 
 
 def filmed(policy: Policy, config: RunConfig, record: EpisodeRecord, folder: Path) -> str:
-    """Record an episode once more into a run folder; "" or why there is no video."""
+    """Replay an episode and record its video; return "", or why there is no video.
+
+    Args:
+        policy: policy of the config.
+        config: config of the cell.
+        record: record of the episode.
+        folder: run folder.
+    """
     from ..episodes.failure_videos import record_video
 
     env = made(config, "rgb_array")

@@ -1,4 +1,4 @@
-"""What follows the last episode of a run: pictures, videos of failures, the report, and what the terminal says."""
+"""Final steps of a run: pictures, videos of failures, the report, and its summary on the terminal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ...configs.grid import Grid
+from ...configs import Grid
 from ..atomic_files import write_whole
 from ..episodes.episode_records import EpisodeRecord
 from ..episodes.failure_selection import FILMED, chosen, video_of
@@ -19,7 +19,13 @@ from ..workers.dispatcher import Executor, Outcome
 
 
 def show(executor: Executor, grid: Grid, folder: Path) -> None:
-    """Figure and video of the first episode of a run of one cell, unless they are there."""
+    """Draw figure and video of the first episode of a run with one cell, unless they exist.
+
+    Args:
+        executor: runs the job.
+        grid: grid with a single cell.
+        folder: run folder.
+    """
     before, (cell,) = written_json(folder, SHOWN), grid.cells
     if before and (before["video"] or not cell.video):
         return
@@ -31,7 +37,14 @@ def show(executor: Executor, grid: Grid, folder: Path) -> None:
 
 
 def film(executor: Executor, grid: Grid, folder: Path, records: Iterable[EpisodeRecord]) -> None:
-    """Videos of the first failure of each kind of each method, unless they were tried before."""
+    """Record the first failure of each kind of each method, unless that was tried before.
+
+    Args:
+        executor: runs the jobs.
+        grid: the cells.
+        folder: run folder.
+        records: all finished episodes.
+    """
     cells = {cell.digest(): cell.model_dump(mode="json") for cell in grid.cells}
     place = {digest: k for k, digest in enumerate(cells)}
     ordered = sorted(records, key=lambda record: (place[record.cell], record.index))
@@ -48,13 +61,13 @@ def film(executor: Executor, grid: Grid, folder: Path, records: Iterable[Episode
 
 
 def _problem(outcome: Outcome) -> str:
-    """Why a worker could not do a job at all; "" if it could."""
+    """Return why a worker could not do a job at all; "" if it could."""
     answer = outcome.answer
     return f"the worker: {outcome.lost}" if answer is None else answer.get("crash") or answer.get("refused") or ""
 
 
 def report(folder: Path) -> list[str]:
-    """Write the report of a run folder; the lines for the terminal.
+    """Write the report of a run folder and return the lines for the terminal.
 
     Raises:
         BadConfig: a file of the folder cannot be read.

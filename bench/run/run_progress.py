@@ -1,4 +1,4 @@
-"""What a run says while it goes on: counts per cell and the time left, to standard error."""
+"""Progress display of a run on standard error: counts per cell and the time left."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from ...configs.grid import Grid
-from ...configs.run_config import RunConfig
+from ...configs import Grid, RunConfig
 from ..console import labeled
 from ..episodes.episode_records import EpisodeRecord
 
@@ -32,20 +31,25 @@ class RunProgress:
         self._all: Any = None
 
     def say(self, text: str) -> None:
-        """A line."""
+        """Print a line."""
         self._console.print(text)
 
     def warn(self, text: str) -> None:
-        """A line that must not be overlooked."""
+        """Print a line, labeled as a warning."""
         self._console.print(labeled("warning", "yellow", text))
 
     def waiting(self, what: str) -> AbstractContextManager[Any]:
-        """Show what is being waited for."""
+        """Show a status text while the context is open."""
         return self._console.status(what)
 
     @contextmanager
     def showing(self, episodes: Iterable[tuple[RunConfig, int]], done: Iterable[EpisodeRecord]) -> Iterator[None]:
-        """Show bars meanwhile: one for all episodes, and one for each cell that is in work."""
+        """Show progress bars while the context is open: one for all episodes, and one for each unfinished cell.
+
+        Args:
+            episodes: cell and scenario index of all episodes of this shard.
+            done: records of the episodes that are already finished.
+        """
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
         mine = {(cell.digest(), index) for cell, index in episodes}
@@ -59,7 +63,7 @@ class RunProgress:
             yield
 
     def add(self, record: EpisodeRecord) -> None:
-        """Count an episode; a cell that is complete gets a line of its own."""
+        """Count a finished episode; print a line for every completed cell."""
         cell = record.cell
         self._count(record)
         self._progress.update(self._all, advance=1)

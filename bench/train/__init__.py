@@ -1,1 +1,1 @@
-"""`onedemo train`: learners on a task."""
+"""`onedemo train`: training of learners on a task."""

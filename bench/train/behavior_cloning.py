@@ -1,4 +1,4 @@
-"""Behavior cloning of the ONE demonstration, with the interface of a learner of Stable-Baselines3."""
+"""Behavior cloning of the ONE demonstration, with the interface of a Stable-Baselines3 learner."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ import numpy as np
 from ...baselines.extras import needed
 
 EXTRA = "rl"
+"""Extra of onedemo that brings torch."""
 
 
 class Clone:
-    """A network that is to act as was shown; least squares by Adam, over and over the same transitions.
+    """Network trained to act as demonstrated: least squares with Adam on the transitions of one demonstration.
 
     Args:
-        before: (n, size) float32, scaled features of what was seen.
-        actions: (n, m) float32, what was done then.
+        before: (n, size) float32, scaled features of the observations.
+        actions: (n, m) float32, demonstrated actions.
         values: `hidden`, `learning_rate`, `batch_size`.
-        device: torch's.
+        device: torch device, or "auto".
     """
 
     def __init__(self, before: np.ndarray, actions: np.ndarray, values: dict[str, Any], device: str):
@@ -41,12 +42,12 @@ class Clone:
         self.loss = float("nan")
 
     def parts(self) -> Iterator[tuple[str, Any]]:
-        """Name and object of everything that is learned."""
+        """Yield name and object of everything that is learned."""
         yield "network", self.network
         yield "optimizer", self.optimizer
 
     def learn(self, steps: int) -> None:
-        """Make gradient steps on batches drawn from torch's generator."""
+        """Take gradient steps on batches drawn from torch's generator."""
         torch = self._torch
         for _ in range(steps):
             rows = torch.randint(len(self._seen), (self._batch,)).to(self.device)

@@ -1,4 +1,4 @@
-"""`onedemo train`: a config in, learning curves and actors out; interrupted trainings go on where they stopped."""
+"""`onedemo train`: a config in, learning curves and actors out; interrupted trainings continue where they stopped."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ...configs.shipped_files import shipped_training
-from ...configs.train_config import TrainConfig, load_training
-from ...planner.errors import BadConfig, UnknownName
+from ...configs import BadConfig, TrainConfig, load_training, shipped_training
+from ...planner.errors import UnknownName
 from ..atomic_files import write_whole
 from ..console import console
 from ..episodes.run_folder import LOG, open_folder
@@ -24,13 +23,16 @@ from .progress import progress, steps_done
 
 
 def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
-    """Train and write the folder; returns the exit code.
+    """Train as a config says and write the training's folder.
 
     Args:
-        config: a file, or the name of a shipped config.
-        overrides: `key=value` changes.
-        output: where the folder is made.
-        quiet: print only the folder, and errors.
+        config: config file, or the name of a shipped training.
+        overrides: `key=value` changes to the config.
+        output: parent folder of the training's folder.
+        quiet: print only the folder and errors.
+
+    Returns:
+        The exit code.
 
     Raises:
         BadConfig: the config, an override or the demonstration cannot be used.
@@ -54,11 +56,11 @@ def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool
 
 
 def check(config: TrainConfig) -> None:
-    """Refuse what cannot be trained, before anything is built.
+    """Refuse an impossible training before anything is built.
 
     Raises:
-        BadConfig: an unknown name, argument or setting.
-        MissingExtra: the extra is not installed.
+        BadConfig: an unknown name, argument or setting, or a device that torch cannot use.
+        MissingExtra: torch or Stable-Baselines3 is not installed.
     """
     from ...baselines.extras import needed
     from .config_checks import check_training
@@ -70,17 +72,23 @@ def check(config: TrainConfig) -> None:
     try:
         torch.empty(0, device="cpu" if config.device == "auto" else config.device)
     except (RuntimeError, AssertionError) as error:
-        # Stable-Baselines3 would train on the processor instead, and say nothing
+        # Stable-Baselines3 would silently train on the CPU instead
         reason = f"torch cannot use {config.device!r} here: {str(error).splitlines()[0]}; auto takes what there is"
         raise BadConfig(config.name, "device", reason) from None
 
 
 def train(config: TrainConfig, folder: Path, executor: Executor, err: Any) -> None:
-    """Run the legs that are missing, the seeds side by side.
+    """Run the missing training rounds, with the seeds in parallel.
+
+    Args:
+        config: the training.
+        folder: folder of the training.
+        executor: runs the training jobs.
+        err: console for progress.
 
     Raises:
-        BadConfig: what a worker refuses.
-        WorkerFailed: workers die, or cannot do their work.
+        BadConfig: a worker refuses the config.
+        WorkerFailed: workers died twice or crashed.
     """
     waiting: deque[Job] = deque()
     done = {seed: len(curve_of(folder, seed)) for seed in seeds_of(config)}
@@ -100,7 +108,7 @@ def train(config: TrainConfig, folder: Path, executor: Executor, err: Any) -> No
             err.print(f"seed {seed}, {point['steps']} steps: {success:.0%} succeed, return {average:.1f}")
             done[seed] = leg
             if leg < config.legs:
-                # the same worker takes it: it has this learner in memory
+                # queued first: the worker that is free now has this learner in memory
                 waiting.appendleft(_job(config, folder, seed, leg + 1))
 
 
@@ -151,7 +159,7 @@ def _path(config: str) -> Path:
 
 
 def _describe(config: TrainConfig, folder: Path, command: str) -> None:
-    """Write what the training is."""
+    """Write the config and the environment of the training into its folder."""
     write_whole(folder / CONFIG, json.dumps(config.model_dump(mode="json"), indent=1) + "\n")
     write_whole(
         folder / "environment.json", json.dumps({**fingerprint(*LEARNING), "command": command}, indent=2) + "\n"

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from ...configs.run_config import RunConfig
-from ...configs.train_config import TrainConfig
-from ...planner.errors import BadConfig
+from ...configs import BadConfig, RunConfig, TrainConfig
 from ..run.config_checks import check_env, check_name, fitting_demonstration, known_names
 
 CHOSEN = ("reward", "goal_form", "end_on_success", "control_mode")
-"""Arguments of environments that the algorithm of a training chooses."""
+"""Environment arguments that the training's algorithm decides."""
 
 
 def check_training(config: TrainConfig) -> None:
-    """Refuse a training that cannot be: its names, its arguments, its demonstration.
+    """Refuse an impossible training: its names, arguments, demonstration or learner settings.
 
     Raises:
-        BadConfig: an unknown name or argument.
-        BadDemonstration: the demonstration is of something else.
+        BadConfig: an unknown name, argument or setting.
+        BadDemonstration: the demonstration belongs to another task.
+        MissingExtra: Stable-Baselines3 is not installed.
     """
     from ...baselines.learning.task_demonstrations import EPISODES
     from .learners import chosen

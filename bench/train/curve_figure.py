@@ -1,4 +1,4 @@
-"""Learning curves: success against steps, every seed drawn, and what needs no step beside them."""
+"""Learning curves: success and return against steps for every seed, with lines for methods that need no steps."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from ..statistics import hierarchical_bootstrap, interquartile_mean, wilson
 from .evaluations import Point
 
 HEIGHT, COLUMNS = 3.3, 2
-"""Of a figure without its legend [inch]; columns of the legend."""
+"""Height of a figure without its legend [inch]; number of legend columns."""
 MARGIN = 0.03
-"""Of the axis of successes beyond 0 and 1."""
+"""Margin of the success axis beyond 0 and 1, as a share of successes."""
 DASH = 2.0
-"""Length of a dash, in widths of its line."""
+"""Length of a dash in line widths."""
 Curves = Sequence[Sequence[Point]]
-"""Of each seed its evaluations."""
+"""Evaluations of each seed."""
 
 
 class Line(NamedTuple):
-    """What needs no step of the environment.
+    """Horizontal line of a method that needs no environment steps.
 
     Attributes:
-        method: that it is drawn like.
-        share: of successes.
+        method: method whose color the line takes.
+        share: share of successes.
     """
 
     method: str
@@ -39,9 +39,10 @@ class Line(NamedTuple):
 
 
 def mean_interval(groups: Sequence[Sequence[bool]]) -> tuple[float, float]:
-    """95 % interval of the share of successes: seeds are drawn, then episodes of each.
+    """Return the 95 % interval of the share of successes, bootstrapped over seeds and then over their episodes.
 
-    Where all succeed, or none, there is nothing to draw; then Wilson's, as if all were one training's.
+    Where all episodes succeed, or none, the bootstrap has no spread: the interval is Wilson's then, as if all episodes
+    belonged to one training.
     """
     _, low, high = hierarchical_bootstrap([np.asarray(group, dtype=float) for group in groups], np.mean)
     every = [success for group in groups for success in group]
@@ -49,9 +50,11 @@ def mean_interval(groups: Sequence[Sequence[bool]]) -> tuple[float, float]:
 
 
 def summary_rows(curves: Curves) -> list[tuple[int, float, float, float, float, float, float]]:
-    """Steps, share of successes with its interval, interquartile mean of the returns with its, at each evaluation.
+    """Return the statistics of each evaluation that all seeds have had.
 
-    Only where all seeds have been evaluated.
+    Returns:
+        Rows of steps, share of successes, its interval (low, high), interquartile mean of the returns, and its interval
+        (low, high).
     """
     rows = []
     for points in zip(*curves, strict=False):
@@ -66,13 +69,13 @@ def summary_rows(curves: Curves) -> list[tuple[int, float, float, float, float, 
 def draw_curves(
     trainings: Mapping[str, tuple[str, Curves]], stem: Path, title: str, lines: Mapping[str, Line] | None = None
 ) -> list[Path]:
-    """Draw successes and returns against steps as .png and .pdf; the files.
+    """Draw successes and returns against steps as .png and .pdf; return the two files.
 
     Args:
-        trainings: by label, the method that it is drawn like, and its curves.
-        stem: of the files.
-        title: of the figure.
-        lines: what needs no step, by label.
+        trainings: by label, the method whose look the curves take, and the curves.
+        stem: path of the files without suffix.
+        title: title of the figure.
+        lines: by label, methods that need no environment steps.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -84,7 +87,7 @@ def draw_curves(
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         handles, labels = [], []
         for k, (label, line) in enumerate(lines.items()):
-            # dashes that take turns: lines at the same height are all seen
+            # staggered dashes: lines at the same height all remain visible
             dashes = (DASH * k, (DASH, DASH * max(1, len(lines) - 1)))
             style = {"color": look_of(line.method).color, "linewidth": 1.5}
             top.axhline(line.share, linestyle=dashes, clip_on=False, **style)
@@ -104,7 +107,7 @@ def draw_curves(
         bottom.xaxis.set_major_formatter(lambda value, _: f"{value / 1e3:g}k" if thousands and value else f"{value:g}")
         bottom.locator_params(axis="x", nbins=6)
         share_axis(top, "success")
-        # none and all are what is looked for most: not on the frame
+        # shares of 0 and 1 matter most: they must not lie on the frame
         top.set_ylim(-MARGIN, 1.0 + MARGIN)
         legend_above(figure, handles, labels, COLUMNS)
         saved(figure, stem)
@@ -112,7 +115,7 @@ def draw_curves(
 
 
 def _drawn(top: Any, bottom: Any, look: Look, curves: Curves) -> Any:
-    """For successes and for returns a thin line for each seed, a thick one for all, its interval; the handle."""
+    """Draw thin lines for the seeds, a thick line for all and its interval, on both axes; return the legend handle."""
     rows = np.array(summary_rows(curves)).reshape(-1, 7)
     style = {"color": look.color, "marker": look.marker, "linestyle": look.line, "linewidth": 1.5, "markersize": 3.0}
     line = None

@@ -1,4 +1,4 @@
-"""The evaluations of a training as its folder keeps them; needs no torch."""
+"""Evaluations of a training as its folder stores them; needs no torch."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.errors import BadConfig
+from ...configs import BadConfig
 
 NUMBERS, LEG = "state.json", "leg-{:05d}"
+"""File with the curve and counters of a seed, and folder of the training round after which it was written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """An evaluation.
+    """Evaluation at the end of a training round (`leg`).
 
     Attributes:
-        seed: of the training.
-        leg: how many evaluations there were, this one included.
-        steps: of the environment until then; gradient steps of "bc".
-        successes: (n,) of each scenario, in order.
-        returns: (n,) sum of dense rewards of each scenario; a success counts as 1 for every step that it saved.
-        seconds: real time of all legs so far, evaluations included; not part of the result.
+        seed: seed of the training.
+        leg: number of evaluations so far, this one included.
+        steps: environment steps so far; for "bc", gradient steps.
+        successes: (n,) success in each scenario, in order.
+        returns: (n,) sum of dense rewards in each scenario; a success adds 1 for every step it saved.
+        seconds: real time [s] of all rounds so far, evaluations included; not part of the result.
     """
 
     seed: int
@@ -36,20 +37,20 @@ class Point:
 
     @property
     def success(self) -> float:
-        """Share of the scenarios."""
+        """Share of successes."""
         return float(np.mean(self.successes))
 
 
 def last_leg(folder: Path) -> Path | None:
-    """The folder of the last whole leg of a seed; None: there is none."""
+    """Return the folder of a seed's last complete training round, or None."""
     return max(folder.glob("leg-*"), default=None)
 
 
 def numbers_of(leg: Path) -> dict[str, Any]:
-    """What the state of a leg says besides weights.
+    """Return the JSON part of a round's state: curve, counters, config digest.
 
     Raises:
-        BadConfig: it cannot be read.
+        BadConfig: the file cannot be read.
     """
     file = leg / NUMBERS
     try:
@@ -63,7 +64,7 @@ def numbers_of(leg: Path) -> dict[str, Any]:
 
 
 def points_of(numbers: dict[str, Any]) -> list[Point]:
-    """The evaluations so far."""
+    """Return the evaluations stored in a state."""
     return [
         Point(**{**each, "successes": tuple(each["successes"]), "returns": tuple(each["returns"])})
         for each in numbers["points"]

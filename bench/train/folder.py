@@ -1,12 +1,12 @@
-"""What lies in a training's folder, and what is made of it: the curve as CSV, the figure, the best actor.
+"""Layout of a training's folder, and the results written into it: curve as CSV, figure, best actor.
 
-| file | what |
+| file | content |
 |---|---|
 | `config.json` | the config with the changes of the command line |
-| `environment.json` | on what it was run, and the command |
-| `seed-0/leg-00010/` | of each seed the last whole leg: the curve so far, weights, replay buffer, actor |
+| `environment.json` | machine, versions and the command |
+| `seed-0/leg-00010/` | last complete training round of each seed: curve so far, weights, replay buffer, actor |
 | `seed-0/tensorboard/` | losses, returns and evaluations for TensorBoard |
-| `seed-0/steps` | how far it is, renewed between evaluations |
+| `seed-0/steps` | steps done, updated between evaluations |
 | `curve.csv` | every evaluation of every seed |
 | `curve.png`, `curve.pdf` | success against steps, every seed drawn |
 | `actor.json`, `actor.safetensors` | the last actor of the best seed |
@@ -19,7 +19,7 @@ import io
 import shutil
 from pathlib import Path
 
-from ...configs.train_config import TrainConfig
+from ...configs import TrainConfig
 from ..atomic_files import write_whole
 from .evaluations import Point, last_leg, numbers_of, points_of
 
@@ -28,22 +28,34 @@ COLUMNS = ("seed", "steps", "episodes", "successes", "success", "return", "secon
 
 
 def seeds_of(config: TrainConfig) -> range:
-    """The seeds of a training."""
+    """Return the seeds of a training."""
     return range(config.seed, config.seed + config.seeds)
 
 
 def curve_of(folder: Path, seed: int) -> list[Point]:
-    """The evaluations of a seed so far.
+    """Return the evaluations of a seed so far.
+
+    Args:
+        folder: folder of the training.
+        seed: seed of the learner.
 
     Raises:
-        BadConfig: its state is damaged.
+        BadConfig: the stored state is damaged.
     """
     leg = last_leg(folder / SEED.format(seed))
     return [] if leg is None else points_of(numbers_of(leg))
 
 
 def actor_of_best(folder: Path, curves: dict[int, list[Point]]) -> int | None:
-    """Copy the last actor of the seed that succeeds most often, then earns most; its seed."""
+    """Copy the last actor of the seed with the most successes, then the highest return, into the training's folder.
+
+    Args:
+        folder: folder of the training.
+        curves: evaluations by seed.
+
+    Returns:
+        The seed; None if nothing has been evaluated.
+    """
     known = {seed: points[-1] for seed, points in curves.items() if points}
     if not known:
         return None
@@ -56,7 +68,12 @@ def actor_of_best(folder: Path, curves: dict[int, list[Point]]) -> int | None:
 
 
 def write_curves(config: TrainConfig, folder: Path) -> list[str]:
-    """Write what is made of the curves; lines for the terminal."""
+    """Write the curve as CSV, the figure and the best actor; return the lines for the terminal.
+
+    Args:
+        config: the training.
+        folder: folder of the training.
+    """
     from .curve_figure import draw_curves, mean_interval, summary_rows
 
     curves = {seed: curve_of(folder, seed)[: config.legs] for seed in seeds_of(config)}

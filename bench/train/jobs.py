@@ -1,9 +1,9 @@
-"""A worker that trains: it keeps the learner it had last, and goes on from the disk with any other.
+"""Job handler for trainings: keeps its last learner in memory and loads any other one from the disk.
 
-| job | besides "cell" (the config) | answer |
+| job | keys besides "cell" (the config) | answer |
 |---|---|---|
 | "prepare" | | {} |
-| "train" | "seed", "leg", "folder" | "point": see `training.Point` |
+| "train" | "seed", "leg", "folder" | "point": see `evaluations.Point` |
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ...configs.train_config import TrainConfig
+from ...configs import TrainConfig
 from ...planner.errors import OneDemoError
 from ..run.episode_jobs import refusal
 from ..workers.dispatcher import Answer, Job
@@ -20,14 +20,14 @@ from ..workers.worker_process import main
 
 
 class TrainingJobs:
-    """Does the jobs of trainings."""
+    """Job handler of `onedemo train`."""
 
     def __init__(self) -> None:
         self._trainee: Any = None
         self._at = ("", -1)
 
     def do(self, job: Job) -> Answer:
-        """The answer to a job."""
+        """See `JobHandler`."""
         if job["kind"] != "train":
             return {}
         try:
@@ -42,14 +42,14 @@ class TrainingJobs:
         if self._at != (folder, leg):
             self._trainee = None
             self._trainee = Trainee(TrainConfig.model_validate(job["cell"]), job["seed"], Path(folder))
-        # a job that is given out once more may have been finished just before its worker died
+        # the job may be a retry of one that was finished just before its worker died
         done = self._trainee.points
         point = done[leg - 1] if len(done) >= leg else self._trainee.run_leg()
         self._at = (folder, leg + 1)
         return point
 
     def close(self) -> None:
-        """Forget the learner."""
+        """Drop the learner."""
         self._trainee = None
 
 

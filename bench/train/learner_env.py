@@ -1,4 +1,4 @@
-"""The environments that learners see: features of ours, scaled; the method inside of what corrects it."""
+"""Environments as learners see them: with scaled features and, for the residual learner, the screw policy inside."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from ...baselines.learning.feature_scaling import FlatFeatures, Normalization, measured_normalization
-from ...baselines.learning.features import OBSTACLE, Features
-from ...baselines.learning.residual_policy import AroundScrew
-from ...configs.shipped_files import demonstration_path
-from ...configs.train_config import TrainConfig
+from ...baselines import AroundScrew, Features, FlatFeatures, measured_normalization
+from ...baselines.learning.feature_scaling import Normalization
+from ...baselines.learning.features import OBSTACLE
+from ...configs import TrainConfig, load_demonstration
 from ...envs.core.single_motion import LAST_ACTION
-from ...planner.imitation.demonstration import Demonstration
-from ...planner.imitation.demonstration_files import load_demonstration
+from ...planner import Demonstration
 from ..task_table import TASKS
 
 GOALS = ("achieved_goal", "desired_goal")
 MEASURED_EPISODES, MEASURED_STEPS = 20, 75
-"""Episodes of random actions, and their length, that say how features are scaled."""
+"""Number and length [steps] of the random-action episodes that determine the scaling of the features."""
 
 
 class ScaledGoals(gym.ObservationWrapper):
-    """The goal form with a scaled observation; goals stay as they are, for they are exchanged and compared.
+    """Goal form of an environment with a scaled observation.
+
+    Goals stay unscaled, because hindsight exchanges and compares them.
 
     Args:
-        env: in the goal form.
-        normalization: of `Features.raw` of its observation.
+        env: environment in the goal form.
+        normalization: scaling of `Features.raw` of its observation.
     """
 
     def __init__(self, env: gym.Env, normalization: Normalization):
@@ -41,18 +41,23 @@ class ScaledGoals(gym.ObservationWrapper):
         self.observation_space = gym.spaces.Dict({**goals, "observation": gym.spaces.Box(low, high, dtype=np.float32)})
 
     def observation(self, observation: Any) -> dict[str, np.ndarray]:
-        """The observation in single precision, scaled but for the goals."""
+        """Return the observation in single precision, scaled except for the goals."""
         goals = {key: observation[key].astype(np.float32) for key in GOALS}
         return {**goals, "observation": self._scale(observation["observation"].astype(np.float32))}
 
 
 def shown(config: TrainConfig) -> Demonstration:
-    """The demonstration of a config."""
-    return load_demonstration(demonstration_path(config.demonstration))
+    """Load the demonstration of a config."""
+    return load_demonstration(config.demonstration)
 
 
 def base_env(config: TrainConfig, **options: Any) -> Any:
-    """The environment of a config as a policy sees it."""
+    """Build the environment of a config as a policy sees it.
+
+    Args:
+        config: the training.
+        options: further arguments of the environment; they take precedence.
+    """
     from ... import envs  # noqa: F401  (registers the ids)
 
     arguments: dict[str, Any] = {"robot": config.robot, "level": config.level, **config.env}
@@ -64,13 +69,18 @@ def base_env(config: TrainConfig, **options: Any) -> Any:
 
 
 def seen_env(config: TrainConfig) -> Any:
-    """The environment with what the learner sees beside, before features are taken and scaled."""
+    """Build the environment before its features are taken and scaled; for `residual`, with the screw policy inside."""
     env = base_env(config)
     return AroundScrew(env, shown(config)) if config.algorithm == "residual" else env
 
 
 def features_of(env: Any, config: TrainConfig) -> tuple[Features, Normalization]:
-    """What is learned from, and how it is scaled: the same for all seeds."""
+    """Return the learner's features and their scaling, which are the same for all seeds.
+
+    Args:
+        env: environment of `seen_env`.
+        config: the training.
+    """
     goal = config.algorithm == "sac-her"
     features = Features.raw(env.observation_space) if goal else Features.of(env.observation_space, _seen(env, config))
     measured = measured_normalization(env, features, episodes=MEASURED_EPISODES, steps=MEASURED_STEPS)
@@ -83,9 +93,9 @@ def features_of(env: Any, config: TrainConfig) -> tuple[Features, Normalization]
 
 
 def _seen(env: Any, config: TrainConfig) -> tuple[str, ...] | None:
-    """The entries a learner sees; None: all but the obstacles'.
+    """Return the observation entries that a learner sees; None: all but the obstacles'.
 
-    A clone that sees what was done last repeats it: in a demonstration that is right nearly always (de Haan et al.,
+    A clone that sees its last action repeats it, since in a demonstration that is nearly always right (de Haan et al.,
     Causal Confusion in Imitation Learning, NeurIPS 2019).
     """
     if config.algorithm != "bc":
@@ -94,7 +104,13 @@ def _seen(env: Any, config: TrainConfig) -> tuple[str, ...] | None:
 
 
 def learners_env(config: TrainConfig, features: Features, normalization: Normalization) -> Any:
-    """The environment that a learner steps."""
+    """Build the environment that a learner steps.
+
+    Args:
+        config: the training.
+        features: features of the observation.
+        normalization: scaling of the features.
+    """
     env = seen_env(config)
     if config.algorithm == "sac-her":
         return ScaledGoals(env, normalization)

@@ -1,4 +1,4 @@
-"""The whole state of a learner as files that hold no code: weights, optimizers, replay buffer."""
+"""Complete state of a learner in files that hold no code: weights, optimizers, replay buffer."""
 
 from __future__ import annotations
 
@@ -9,19 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.errors import BadConfig
+from ...configs import BadConfig
 from .evaluations import NUMBERS
 
 WEIGHTS, REPLAY = "weights.safetensors", "replay.npz"
 COUNTS = ("num_timesteps", "_n_updates", "_episode_num")
-"""Of a model."""
+"""Counters of a model that are part of its state."""
 BUFFERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts", "ep_start", "ep_length")
-"""Arrays of a replay buffer, those that it has."""
+"""Arrays of a replay buffer that are stored if it has them."""
 PLACES = ("pos", "full", "_current_ep_start")
+"""Positions within a replay buffer that are stored if it has them."""
 
 
 def save_state(model: Any, folder: Path, more: dict[str, Any]) -> None:
-    """Write a model's state into a folder, with further numbers."""
+    """Write the state of a model into a folder.
+
+    Args:
+        model: model of Stable-Baselines3, or a `Clone`.
+        folder: existing folder.
+        more: further JSON values to store with the state.
+    """
     from safetensors.torch import save_file
 
     tensors: dict[str, Any] = {}
@@ -35,10 +42,17 @@ def save_state(model: Any, folder: Path, more: dict[str, Any]) -> None:
 
 
 def load_state(model: Any, folder: Path) -> dict[str, Any]:
-    """Give a model, made from the same config, the state in a folder; the numbers that were written with it.
+    """Restore the state in a folder into a model that was made from the same config.
+
+    Args:
+        model: see `save_state`.
+        folder: folder written by `save_state`.
+
+    Returns:
+        All stored JSON values, `more` of `save_state` included.
 
     Raises:
-        BadConfig: the files are damaged, or of another model.
+        BadConfig: the files are damaged, or belong to another model.
     """
     from safetensors import SafetensorError
     from safetensors.torch import load_file
@@ -63,7 +77,7 @@ def load_state(model: Any, folder: Path) -> dict[str, Any]:
 
 
 def parts_of(model: Any) -> Iterator[tuple[str, Any]]:
-    """Name and object of everything in a model that is learned."""
+    """Yield name and object of everything in a model that is learned."""
     if hasattr(model, "_get_torch_save_params"):
         modules, tensors = model._get_torch_save_params()
         for name in (*modules, *tensors):
@@ -77,7 +91,7 @@ def parts_of(model: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _taken_apart(part: Any, name: str, tensors: dict[str, Any]) -> Any:
-    """A state as what JSON can hold, each tensor replaced by its name in `tensors`."""
+    """Return a state as JSON values, with each tensor moved to `tensors` and replaced by its name."""
     state = part.state_dict() if hasattr(part, "state_dict") else part
     return _walked(state, name, tensors)
 
@@ -105,7 +119,7 @@ def _put_together(table: dict[str, Any], tensors: dict[str, Any]) -> Any:
 
 
 def _buffered(buffer: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """The filled part of a buffer's arrays; entries of dictionaries by their keys."""
+    """Yield the filled part of a buffer's arrays; arrays in dictionaries are named NAME/KEY."""
     count = buffer.buffer_size if buffer.full else buffer.pos
     for name in BUFFERED:
         value = getattr(buffer, name, None)

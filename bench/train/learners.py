@@ -1,4 +1,4 @@
-"""Learners of Stable-Baselines3 on one of the tasks, and the clone of a demonstration; needs the extra `rl`."""
+"""Stable-Baselines3 learners, and the demonstration as their data; needs the extra `rl`."""
 
 from __future__ import annotations
 
@@ -8,30 +8,31 @@ from typing import Any
 
 import numpy as np
 
+from ...baselines import task_episode
 from ...baselines.extras import needed
-from ...baselines.learning.task_demonstrations import task_episode
+from ...configs import BadConfig, TrainConfig
 from ...configs.learner_defaults import DEFAULTS
 from ...configs.learner_values import misfit_of
-from ...configs.train_config import TrainConfig
 from ...envs.core.single_motion import HORIZON
-from ...planner.errors import BadConfig, BadOption
+from ...planner.errors import BadOption
 from .learner_env import base_env, learners_env, shown
 
 EXTRA = "rl"
 OWN = ("hidden", "envs", "n_sampled_goal")
-"""Arguments that are not the algorithm's: widths of the hidden layers, environments that are stepped at once in this
+"""Arguments beyond the algorithm's: widths of the hidden layers, number of environments stepped together in this
 process, and hindsight goals per transition."""
 NOT_OURS = {
     *("policy", "env", "policy_kwargs", "replay_buffer_class", "replay_buffer_kwargs"),
     *("tensorboard_log", "verbose", "seed", "device", "_init_setup_model"),
 }
+"""Arguments of the algorithm that a config may not set."""
 
 
 def chosen(config: TrainConfig) -> dict[str, Any]:
-    """All arguments of the learner, checked.
+    """Return all arguments of the learner, checked.
 
     Raises:
-        BadConfig: an argument that it does not have, or a value that it cannot have.
+        BadConfig: an unknown argument, or a value that it cannot have.
         MissingExtra: Stable-Baselines3 is not installed.
     """
     known = known_arguments(config.algorithm)
@@ -56,7 +57,7 @@ def chosen(config: TrainConfig) -> dict[str, Any]:
 
 
 def _rollout(config: TrainConfig, values: dict[str, Any]) -> tuple[str, int]:
-    """What says how many steps are done between updates, and the number: evaluations come only after updates."""
+    """Return the arguments that set the steps between updates, and the steps; evaluations come only after updates."""
     if config.algorithm == "ppo":
         return "learner.n_steps x learner.envs", values["n_steps"] * values["envs"]
     steps = values.get("train_freq", 1)
@@ -66,7 +67,7 @@ def _rollout(config: TrainConfig, values: dict[str, Any]) -> tuple[str, int]:
 
 
 def known_arguments(algorithm: str) -> set[str]:
-    """Arguments that a config may give a learner."""
+    """Return the arguments that a config may give a learner."""
     if algorithm == "bc":
         return {"hidden", "learning_rate", "batch_size"}
     parameters = set(inspect.signature(_kind(algorithm).__init__).parameters) - {"self", *NOT_OURS}
@@ -75,7 +76,17 @@ def known_arguments(algorithm: str) -> set[str]:
 
 
 def made_model(config: TrainConfig, features: Any, normalization: Any) -> Any:
-    """A learner of Stable-Baselines3 that has learned nothing yet, with its environments."""
+    """Build an untrained Stable-Baselines3 learner with its environments.
+
+    Args:
+        config: the training.
+        features: `Features` of the observation.
+        normalization: `Normalization` of the features.
+
+    Raises:
+        BadConfig: the learner refuses an argument.
+        MissingExtra: Stable-Baselines3 is not installed.
+    """
     library: Any = needed("stable_baselines3", EXTRA)
     monitor: Any = needed("stable_baselines3.common.monitor", EXTRA).Monitor
     vector: Any = needed("stable_baselines3.common.vec_env", EXTRA).DummyVecEnv
@@ -104,14 +115,27 @@ def made_model(config: TrainConfig, features: Any, normalization: Any) -> Any:
     if config.algorithm == "sac-demo":
         model.replay_buffer.show(*demo_transitions(config, features, normalization))
     if config.algorithm == "residual":
-        # what has learned nothing corrects nothing (Silver et al., Residual Policy Learning, 2018)
+        # zero last layer: an untrained learner corrects nothing (Silver et al., Residual Policy Learning, 2018)
         for parameter in model.actor.mu.parameters():
             parameter.data.zero_()
     return model
 
 
 def demo_transitions(config: TrainConfig, features: Any, normalization: Any) -> tuple[np.ndarray, ...]:
-    """Observations, next observations, actions, rewards and ends of the ONE demonstration in this task."""
+    """Return the ONE demonstration as transitions of the config's task.
+
+    Args:
+        config: the training.
+        features: `Features` of the observation.
+        normalization: `Normalization` of the features.
+
+    Returns:
+        float32 arrays of n steps: scaled features (n, size) before and after each step, actions (n, m), rewards (n,),
+        terminations (n,).
+
+    Raises:
+        BadOption: the demonstration, played back in the task, does not succeed.
+    """
     env = base_env(config)
     episode = task_episode(env, shown(config))
     env.close()
@@ -123,23 +147,36 @@ def demo_transitions(config: TrainConfig, features: Any, normalization: Any) -> 
 
 
 def symmetric_buffer() -> type:
-    """A replay buffer of which half of every batch is the demonstration (Ball et al., RLPD, ICML 2023)."""
+    """Return a replay buffer class whose batches are half demonstration (Ball et al., RLPD, ICML 2023)."""
     torch: Any = needed("torch", EXTRA)
     kind: Any = needed("stable_baselines3.common.buffers", EXTRA).ReplayBuffer
 
     class SymmetricBuffer(kind):
-        """Of what was done, and of what was shown."""
+        """Replay buffer with a second one for the demonstration."""
 
         demo: Any = None
 
         def show(self, before: Any, after: Any, actions: Any, rewards: Any, ends: Any) -> None:
-            """Keep the demonstration, for ever."""
+            """Store the demonstration, which is never overwritten.
+
+            Args:
+                before: (n, size) scaled features before each step.
+                after: (n, size) scaled features after it.
+                actions: (n, m) actions.
+                rewards: (n,) rewards.
+                ends: (n,) 1 where the episode terminated.
+            """
             self.demo = kind(len(before), self.observation_space, self.action_space, self.device)
             for row in zip(before, after, actions, rewards, ends, strict=True):
                 self.demo.add(*(np.asarray(part)[None] for part in row), [{}])
 
         def sample(self, batch_size: int, env: Any = None) -> Any:
-            """Half of each."""
+            """Draw half of the batch from the experience and half from the demonstration.
+
+            Args:
+                batch_size: number of transitions.
+                env: see `ReplayBuffer.sample`.
+            """
             half = batch_size // 2
             done, seen = super().sample(batch_size - half, env), self.demo.sample(half, env)
             pairs: Any = zip(done, seen, strict=True)

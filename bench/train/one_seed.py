@@ -1,7 +1,8 @@
-"""One seed of a training, leg by leg: what a leg begins with is on the disk, so that any process may go on.
+"""Training of one seed, round by round; the state between rounds is on the disk, so that any process can continue.
 
-A leg is `evaluate_every` steps and an evaluation. Each begins with an environment that is reset and with all sources
-of randomness seeded from (seed, leg): a training that was killed and goes on has the same curve, to the bit.
+A training round (`leg`) is `evaluate_every` steps followed by an evaluation. Each round starts with a reset environment
+and with all random generators seeded from (seed, leg): a training that was killed and continued has the same curve, bit
+for bit.
 """
 
 from __future__ import annotations
@@ -18,12 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from ...baselines import actor_of, save_actor
 from ...baselines.extras import needed
 from ...baselines.learning.actor import Actor, TrainingInfo
-from ...baselines.learning.actor_files import save_actor
-from ...baselines.learning.export_actor import actor_of
-from ...configs.train_config import TrainConfig
-from ...planner.errors import BadConfig
+from ...configs import BadConfig, TrainConfig
 from .behavior_cloning import Clone
 from .evaluations import LEG, NUMBERS, Point, last_leg, numbers_of, points_of
 from .learner_env import base_env, features_of, seen_env, shown
@@ -32,20 +31,25 @@ from .learners import EXTRA, chosen, demo_transitions, made_model
 from .progress import writing_steps
 
 DEMONSTRATIONS = {"sac-demo": 1, "bc": 1, "residual": 1}
+"""Number of demonstrations that an algorithm learns from; 0 if absent."""
 
 
 class Trainee:
-    """A learner of one seed in this process.
+    """Learner of one seed in this process, restored from the last complete round on the disk.
 
     Args:
-        config: of the training.
-        seed: of it.
-        folder: of this seed.
+        config: the training.
+        seed: seed of the learner.
+        folder: folder of the seed.
+
+    Raises:
+        BadConfig: the stored state is damaged, or of another config.
+        MissingExtra: torch or Stable-Baselines3 is not installed.
     """
 
     def __init__(self, config: TrainConfig, seed: int, folder: Path):
         torch: Any = needed("torch", EXTRA)
-        # small networks are no faster with more, and sums would depend on their number
+        # more threads do not speed up small networks, and sums would depend on the number of threads
         torch.set_num_threads(1)
         self.config, self.seed, self.folder = config, seed, folder
         env = seen_env(config)
@@ -59,14 +63,14 @@ class Trainee:
         self.points = [] if (last := last_leg(folder)) is None else self._loaded(last)
 
     def run_leg(self) -> Point:
-        """Train and evaluate once more, and keep what came of it."""
+        """Train and evaluate one more round, and store the result."""
         begun, before = time.perf_counter(), self.points[-1].seconds if self.points else 0.0
         leg = len(self.points) + 1
         with self._events(leg) as logger:
             self._train(leg, logger)
             steps = int(self.model.num_timesteps)
             successes, returns = evaluated(self.config, self.actor(), self._evaluation)
-            # the names that evaluations have everywhere in Stable-Baselines3
+            # the names that Stable-Baselines3 uses for evaluations
             logger.record("eval/success_rate", float(np.mean(successes)))
             logger.record("eval/mean_reward", float(np.mean(returns)))
             logger.dump(steps)
@@ -77,7 +81,7 @@ class Trainee:
         return point
 
     def actor(self) -> Actor:
-        """What has been learned so far."""
+        """Return the actor learned so far."""
         config, last = self.config, self.points[-1] if self.points else None
         training = TrainingInfo(
             config.algorithm,
@@ -129,7 +133,7 @@ class Trainee:
 
     @contextmanager
     def _events(self, leg: int) -> Iterator[Any]:
-        """A logger for TensorBoard; what it wrote is shown with the legs before once this one is over."""
+        """Open a TensorBoard logger; its file joins those of earlier rounds only when this round is complete."""
         configure: Any = needed("stable_baselines3.common.logger", EXTRA).configure
         events = self.folder / "tensorboard" / f".{leg}"
         shutil.rmtree(events, ignore_errors=True)
@@ -143,7 +147,7 @@ class Trainee:
         events.rmdir()
 
     def _keep(self) -> None:
-        """Write state and actor; the leg before is forgotten once this one is whole."""
+        """Write state and actor; the previous round is deleted once this one is complete."""
         leg = len(self.points)
         target = self.folder / LEG.format(leg)
         part = target.with_name(f".{target.name}")
@@ -168,8 +172,17 @@ class Trainee:
 
 
 def evaluated(config: TrainConfig, actor: Actor, env: Any) -> tuple[tuple[bool, ...], tuple[float, ...]]:
-    """Successes and returns of an actor on the frozen scenarios: seeds from 0 on, as in a comparison."""
-    from ...baselines.learning.learned_policy import LearnedPolicy
+    """Evaluate an actor on the frozen scenarios: seeds from 0 on, as in a comparison.
+
+    Args:
+        config: the training.
+        actor: the actor.
+        env: environment with dense rewards that ends at a success.
+
+    Returns:
+        Success and return of each scenario; a success adds 1 to the return for every step it saved.
+    """
+    from ...baselines import LearnedPolicy
     from ...baselines.learning.residual_policy import ResidualPolicy
 
     if config.algorithm == "residual":

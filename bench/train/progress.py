@@ -1,4 +1,4 @@
-"""How far a training is, between its evaluations too: every seed writes down its steps, the bar reads them."""
+"""Progress of a training between evaluations: every seed writes its step count, and the progress bar reads them."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from ...configs.train_config import TrainConfig
+from ...configs import TrainConfig
 from .folder import SEED, seeds_of
 
 STEPS, EVERY = "steps", 250
-"""File in a seed's folder; steps of the environment after which it is renewed."""
+"""File in a seed's folder; environment steps between two updates of it."""
 
 
 def writing_steps(folder: Path) -> Callable[[dict[str, Any], dict[str, Any]], bool]:
-    """A callback of Stable-Baselines3 that writes down the steps done so far."""
+    """Return a Stable-Baselines3 callback that writes the step count into a seed's folder."""
     last = [-EVERY]
 
     def callback(local: dict[str, Any], _: dict[str, Any]) -> bool:
@@ -28,12 +28,12 @@ def writing_steps(folder: Path) -> Callable[[dict[str, Any], dict[str, Any]], bo
 
 
 def steps_done(config: TrainConfig, folder: Path, legs: dict[int, int]) -> int:
-    """Steps of all seeds, as far as is known.
+    """Return the known number of steps of all seeds.
 
     Args:
-        config: of the training.
-        folder: of it.
-        legs: how many evaluations each seed has had.
+        config: the training.
+        folder: folder of the training.
+        legs: finished evaluations by seed.
     """
     total = 0
     for seed in seeds_of(config):
@@ -46,12 +46,12 @@ def steps_done(config: TrainConfig, folder: Path, legs: dict[int, int]) -> int:
 
 
 def progress(done: Callable[[], int], total: int, console: Any) -> Any:
-    """A bar that asks for itself how many steps are done.
+    """Return a rich progress bar that polls the number of steps.
 
     Args:
-        done: says how many.
-        total: of them.
-        console: rich's.
+        done: returns the number of steps done.
+        total: number of steps of the training.
+        console: console of rich.
     """
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

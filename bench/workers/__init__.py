@@ -1,1 +1,1 @@
-"""Jobs on processes that may die."""
+"""Execution of jobs on worker processes that may die."""

@@ -1,7 +1,7 @@
-"""Jobs given to workers that may die or hang.
+"""Dispatch of jobs to workers that may die or hang.
 
-A worker does one job at a time. If it dies, or takes too long, it is replaced and the job is given out once more; if
-that ends the same way, the job is lost. Nothing else is: the other workers go on.
+A worker does one job at a time. If it dies or exceeds its time limit, it is replaced and the job is retried once; if
+the retry ends in the same way, only this job is lost, and the other workers continue.
 """
 
 from __future__ import annotations
@@ -15,27 +15,28 @@ from typing import Any, NamedTuple, Protocol
 from ...planner.errors import OneDemoError
 
 ERROR, WORKER_DIED, HUNG = "error", "worker_died", "timeout"
-"""Reasons of failure that are not the task's: the policy raised an exception; the process that ran the episode died
-twice; or it had to be ended twice, because the episode took too much real time."""
+"""Failure reasons that are not the task's: the policy raised an exception; the process that ran the episode died twice;
+or it had to be killed twice, because the episode took too much real time."""
 ATTEMPTS = 2
+"""Number of attempts at a job."""
 BUILD_SECONDS = 1200.0
-"""Real time to compile the kernels, and to build a scene and a policy."""
+"""Time limit [s] for compiling the kernels and building a scene and a policy."""
 Job = dict[str, Any]
 Answer = dict[str, Any]
 
 
 class WorkerFailed(OneDemoError):
-    """A worker could not do its work, which is nobody's mistake in a config."""
+    """Failure of a worker that no config is to blame for."""
 
 
 class Outcome(NamedTuple):
-    """What became of a job.
+    """Result of a job.
 
     Attributes:
-        job: as it was given.
-        answer: None if the job was lost.
+        job: the job as submitted.
+        answer: answer of the worker; None if the job was lost.
         lost: "", `WORKER_DIED` or `HUNG`.
-        seconds: real time of the last attempt.
+        seconds: real time [s] of the last attempt.
     """
 
     job: Job
@@ -45,12 +46,15 @@ class Outcome(NamedTuple):
 
 
 class Executor(Protocol):
-    """Runs jobs; used in a `with` statement, at whose end nothing of it is left."""
+    """Runner of jobs; a context manager that leaves nothing running at its end."""
 
     workers: int
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """The outcomes, as they come. To a deque, jobs may be added while outcomes come; it is emptied."""
+        """Yield the outcomes as they arrive.
+
+        A deque of jobs is consumed, and jobs may be appended to it while outcomes arrive.
+        """
         ...
 
     def __enter__(self) -> Executor: ...
@@ -62,23 +66,36 @@ class WorkerBackend(Protocol):
     """Start, feed, poll and stop workers of one kind."""
 
     def spawn(self) -> Any:
-        """A new worker."""
+        """Start a worker and return its handle."""
         ...
 
     def ask(self, worker: Any, job: Job) -> None:
-        """Give a job to an idle worker; if it is dead, `poll` says so."""
+        """Give a job to an idle worker; if the worker is dead, `poll` reports that.
+
+        Args:
+            worker: handle from `spawn`.
+            job: the job.
+        """
         ...
 
     def poll(self, workers: Sequence[Any], seconds: float) -> list[tuple[Any, Answer | None]]:
-        """Those of the workers that have answered, or died (None), within some seconds; as soon as there is one."""
+        """Wait until at least one worker has answered or died.
+
+        Args:
+            workers: the busy workers.
+            seconds: longest time [s] to wait.
+
+        Returns:
+            Worker and answer of those that have answered; the answer of a dead worker is None.
+        """
         ...
 
     def end(self, worker: Any) -> None:
-        """End a worker at once, whatever it does."""
+        """Kill a worker at once, whatever it is doing."""
         ...
 
     def close(self) -> None:
-        """Leave nothing behind, when all workers have been ended."""
+        """Release everything, once all workers have been killed."""
         ...
 
 
@@ -90,13 +107,13 @@ class _Task:
 
 @dataclass
 class _Slot:
-    """A worker and what it is busy with.
+    """Worker with its current task.
 
     Attributes:
-        worker: the backend's handle of it.
-        task: None while it is idle.
-        preparing: it builds what the job needs; the job itself comes next.
-        begun: when that was asked for.
+        worker: handle of the backend.
+        task: current task; None while the worker is idle.
+        preparing: the worker builds what the task needs; the job itself follows.
+        begun: monotonic time [s] of the last request.
     """
 
     worker: Any
@@ -106,13 +123,13 @@ class _Slot:
 
 
 class Dispatcher:
-    """An executor over the workers of one backend.
+    """Executor over the workers of one backend.
 
     Args:
         backend: starts, feeds, polls and stops the workers.
-        workers: how many at most.
-        wall_seconds: real time of an episode, or of a leg of a training, after which its worker counts as hung.
-        build_seconds: the same for everything else.
+        workers: largest number of workers.
+        wall_seconds: time limit [s] of an episode or of a training round (`leg`); a slower worker counts as hung.
+        build_seconds: time limit [s] of every other job.
     """
 
     def __init__(self, backend: WorkerBackend, workers: int, wall_seconds: float, build_seconds: float = BUILD_SECONDS):
@@ -129,20 +146,20 @@ class Dispatcher:
         self.backend.close()
 
     def stop_all(self) -> None:
-        """End all workers; the next job is for new ones."""
+        """Kill all workers; the next job starts new ones."""
         for slot in self._slots:
             self.backend.end(slot.worker)
         self._slots.clear()
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """The outcomes, as they come."""
+        """See `Executor`."""
         new, again = jobs if isinstance(jobs, deque) else deque(jobs), deque[_Task]()
         while new or again or any(slot.task for slot in self._slots):
             self._give_out(new, again)
             yield from self._take_in(again)
 
     def _give_out(self, new: deque[Job], again: deque[_Task]) -> None:
-        """Give jobs to idle workers, first those that were lost with one."""
+        """Assign jobs to idle workers, retries first."""
         for slot in self._slots:
             if (new or again) and slot.task is None:
                 self._begin(slot, again.popleft() if again else _Task(new.popleft()))
@@ -182,7 +199,7 @@ class Dispatcher:
         return self._limits.get(kind, self._build_seconds)
 
     def _lost(self, slot: _Slot, reason: str, again: deque[_Task]) -> Iterator[Outcome]:
-        """Replace a worker; give its job out once more, or give it up."""
+        """Replace a worker; retry its job, or report it as lost."""
         self.backend.end(slot.worker)
         self._slots.remove(slot)
         task = slot.task

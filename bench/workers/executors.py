@@ -1,4 +1,4 @@
-"""Where episodes run: in this process, in worker processes, or in Ray's actors. The results are the same bits."""
+"""Executors of jobs: this process, worker processes, or Ray actors. The results are the same, bit for bit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .worker_process import JobHandler
 
 
 class Serial:
-    """An executor in this process: nothing is limited in time, and what kills an episode kills the run.
+    """Executor in this process: no time limits, and a crash of an episode ends the run.
 
     Args:
         handler: does the jobs.
@@ -32,7 +32,7 @@ class Serial:
         self._handler.close()
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """The outcomes, in order."""
+        """Yield the outcomes in order; see `Executor`."""
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         while waiting:
             job, begun = waiting.popleft(), time.monotonic()
@@ -40,16 +40,16 @@ class Serial:
 
 
 def executor_for(settings: RunSettings, handler: type[JobHandler], jobs: int, log: Path | None) -> Executor:
-    """The executor that a config names.
+    """Return the executor that a config names.
 
     Args:
-        settings: `executor`, `workers`, `address` and `wall_seconds` of them.
-        handler: does the jobs, in its module when that is run as a program.
-        jobs: how many there will be: no more workers are started.
-        log: file that takes what worker processes print.
+        settings: `executor`, `workers`, `address` and `wall_seconds` are used.
+        handler: class that does the jobs; its module, run as a program, is a worker process.
+        jobs: number of jobs; no more workers than that are started.
+        log: file for the output of worker processes; None: it is discarded.
 
     Raises:
-        BadConfig: Ray is wanted, but not installed or not reachable.
+        BadConfig: Ray is requested, but not installed or not reachable.
     """
     if settings.executor == "serial":
         return Serial(handler())
@@ -65,5 +65,5 @@ def executor_for(settings: RunSettings, handler: type[JobHandler], jobs: int, lo
 
 
 def cores() -> int:
-    """Processor cores that this process may use."""
+    """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0))

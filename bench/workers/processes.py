@@ -1,6 +1,6 @@
-"""Workers as processes of their own, each behind two pipes.
+"""Workers as separate processes, each behind two pipes.
 
-A stock pool breaks as a whole when one of its processes dies, and cannot end one that hangs.
+A standard process pool breaks as a whole when one of its processes dies, and cannot kill one that hangs.
 """
 
 from __future__ import annotations
@@ -19,20 +19,21 @@ from .dispatcher import Answer, Job
 from .worker_process import JobHandler, one_thread
 
 CHUNK = 1 << 16
+"""Largest number of bytes read from a pipe at once."""
 
 
 def command_of(handler: type[JobHandler]) -> tuple[str, ...]:
-    """The command of a worker process: the module of its handler, which serves jobs when it is run."""
+    """Return the command of a worker process: the handler's module, which serves jobs when it is run."""
     return (sys.executable, "-m", handler.__module__)
 
 
 class Worker:
-    """A running process.
+    """Running worker process.
 
     Attributes:
-        process: it.
-        answers: file descriptor that its answers come from.
-        read: what has come of the next answer.
+        process: handle of the process.
+        answers: file descriptor from which its answers are read.
+        read: bytes received so far of the next answer.
     """
 
     def __init__(self, command: Sequence[str], log: Path | None):
@@ -46,14 +47,18 @@ class Worker:
                     stdout=subprocess.DEVNULL,
                     stderr=errors,
                     pass_fds=(other,),
-                    # nothing is imported from the folder that the user happens to be in
+                    # PYTHONSAFEPATH: no imports from the user's current folder
                     env={**os.environ, **one_thread(), "PYTHONSAFEPATH": "1"},
                 )
             finally:
                 os.close(other)
 
     def take(self) -> tuple[bool, Answer | None]:
-        """Read what is there: whether that made an answer, or the end (None), of it."""
+        """Read the available bytes.
+
+        Returns:
+            Whether an answer is complete or the process has died, and the answer; None if it has died.
+        """
         data = os.read(self.answers, CHUNK)
         if not data:
             return True, None
@@ -66,22 +71,22 @@ class Worker:
 
 
 class Processes:
-    """Worker processes.
+    """Backend of worker processes.
 
     Args:
-        command: what starts one; see `command_of`.
-        log: file that takes what they print; None: nothing does.
+        command: command that starts a worker; see `command_of`.
+        log: file for the output of the workers; None: it is discarded.
     """
 
     def __init__(self, command: Sequence[str], log: Path | None = None):
         self._command, self._log = command, log
 
     def spawn(self) -> Worker:
-        """Start a process."""
+        """See `WorkerBackend`."""
         return Worker(self._command, self._log)
 
     def ask(self, worker: Worker, job: Job) -> None:
-        """Send a job; that the process is dead shows when an answer is awaited."""
+        """See `WorkerBackend`."""
         pipe = worker.process.stdin
         assert pipe
         with suppress(BrokenPipeError):
@@ -89,9 +94,9 @@ class Processes:
             pipe.flush()
 
     def poll(self, workers: Sequence[Worker], seconds: float) -> list[tuple[Any, Answer | None]]:
-        """The workers that have answered or died, within some seconds."""
+        """See `WorkerBackend`."""
         pipes = {worker.answers: worker for worker in workers}
-        # poll, unlike select, takes any number of descriptors of any size
+        # poll, unlike select, has no limit on the number or value of descriptors
         poll = select.poll()
         for pipe in pipes:
             poll.register(pipe, select.POLLIN | select.POLLHUP)
@@ -103,7 +108,7 @@ class Processes:
         return found
 
     def end(self, worker: Worker) -> None:
-        """Kill a process, also a stopped one, and wait until it is gone."""
+        """See `WorkerBackend`; waits until the process is gone. Stopped processes are killed, too."""
         worker.process.kill()
         worker.process.wait()
         os.close(worker.answers)
@@ -112,4 +117,4 @@ class Processes:
                 worker.process.stdin.close()
 
     def close(self) -> None:
-        """Nothing is left."""
+        """See `WorkerBackend`."""

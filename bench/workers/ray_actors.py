@@ -1,7 +1,7 @@
-"""Workers as actors of Ray, on this machine or on a cluster: each keeps its environments.
+"""Workers as Ray actors, on this machine or on a cluster; each keeps its environments.
 
-Ray's dashboard and its job port let whoever reaches them run code: a local cluster has no dashboard and listens on
-the loopback address; a cluster's address is used only if the user gives one.
+Ray's dashboard and job port let anyone who reaches them run code: a local cluster therefore has no dashboard and
+listens on the loopback address, and a remote cluster is used only if the user gives its address.
 """
 
 from __future__ import annotations
@@ -17,41 +17,42 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ...planner.errors import BadConfig
+from ...configs import BadConfig
 from .dispatcher import Answer, Job
 from .worker_process import JobHandler, answered, one_thread
 
 LOOPBACK = "127.0.0.1"
 FORM = re.compile(r"(?:ray://)?(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[^\s:/\[\]]+)):(?P<port>\d{1,5})")
+"""Form of a cluster's address: [ray://]HOST:PORT."""
 FOUND_BY_RAY = ("auto", "local")
 """Addresses that name no machine: Ray itself looks for a cluster on this one."""
 PATIENCE = 5.0
-"""Seconds in which a cluster must answer: Ray would ask for minutes."""
+"""Time [s] in which a cluster must answer; Ray itself would try for minutes."""
 
 
 class Actor:
-    """A handler of jobs in a process of Ray's."""
+    """Job handler in a Ray process."""
 
     def __init__(self, handler: type[JobHandler]):
         self._handler = handler()
 
     def process(self) -> int:
-        """Its id."""
+        """Return the process id."""
         return os.getpid()
 
     def do(self, job: Job) -> Answer:
-        """The answer to a job, whatever happens."""
+        """Return the answer to a job; never raises."""
         return answered(self._handler, job)
 
 
 @dataclass(eq=False)
 class ActorWorker:
-    """An actor.
+    """Running Ray actor.
 
     Attributes:
-        actor: Ray's handle.
-        process: a promise of its process's id.
-        answer: a promise of the answer to its job.
+        actor: Ray's handle of the actor.
+        process: future of its process id.
+        answer: future of the answer to its job.
     """
 
     actor: Any
@@ -60,16 +61,16 @@ class ActorWorker:
 
 
 class RayActors:
-    """Workers that are actors.
+    """Backend of Ray actors.
 
     Args:
-        address: of a cluster; None: one is started on this machine, and ended with the run.
-        workers: processor cores of a cluster that is started.
-        handler: does the jobs in them.
-        log: file that takes why actors died; None: nothing does.
+        address: address of a cluster; None: a cluster is started on this machine and stopped with the run.
+        workers: processor cores of a cluster started here.
+        handler: class that does the jobs.
+        log: file for the reasons why actors died; None: they are discarded.
 
     Raises:
-        BadConfig: Ray is not installed, the address is none, or there is no such cluster.
+        BadConfig: Ray is not installed, the address is malformed, or no cluster answers.
     """
 
     def __init__(self, address: str | None, workers: int, handler: type[JobHandler], log: Path | None = None):
@@ -88,22 +89,22 @@ class RayActors:
         self._actor = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Actor)
 
     def spawn(self) -> ActorWorker:
-        """Start an actor."""
+        """See `WorkerBackend`."""
         actor = self._actor.remote(self._handler)
         return ActorWorker(actor, actor.process.remote())
 
     def ask(self, worker: ActorWorker, job: Job) -> None:
-        """Send a job."""
+        """See `WorkerBackend`."""
         worker.answer = worker.actor.do.remote(job)
 
     def poll(self, workers: Sequence[ActorWorker], seconds: float) -> list[tuple[Any, Answer | None]]:
-        """The workers that have answered or died, within some seconds."""
+        """See `WorkerBackend`."""
         promises = {worker.answer: worker for worker in workers}
         ready, _ = self._ray.wait(list(promises), num_returns=1, timeout=seconds)
         return [(promises[promise], self._answer(promise)) for promise in ready]
 
     def end(self, worker: ActorWorker) -> None:
-        """Kill an actor; on this machine its process too, which hears nothing while it is stopped."""
+        """See `WorkerBackend`; on this machine the process is killed, too, since a stopped one ignores Ray."""
         process = None
         if self._local:
             with suppress(self._ray.exceptions.RayError):
@@ -114,7 +115,7 @@ class RayActors:
                 os.kill(process, signal.SIGKILL)
 
     def close(self) -> None:
-        """Leave the cluster; one that was started here is ended."""
+        """Leave the cluster; one that was started here is stopped."""
         self._ray.shutdown()
 
     def _answer(self, promise: Any) -> Answer | None:
@@ -131,11 +132,11 @@ def check_reachable(address: str, seconds: float = PATIENCE) -> None:
     """Refuse an address at which nothing listens.
 
     Args:
-        address: as `ray.init` takes it.
-        seconds: to wait for an answer of each of the machine's addresses.
+        address: address as `ray.init` takes it.
+        seconds: timeout [s] for each address that the host name resolves to.
 
     Raises:
-        BadConfig: it is not of a form that Ray knows, or nobody answers.
+        BadConfig: the form of the address is unknown to Ray, or no host answers.
     """
     if address in FOUND_BY_RAY:
         return

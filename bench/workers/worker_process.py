@@ -1,7 +1,7 @@
-"""A worker process: jobs come in as lines of JSON, answers go out as lines of JSON.
+"""Main loop of a worker process: jobs arrive as lines of JSON, answers leave as lines of JSON.
 
-It dies with its parent, whatever that dies of, ignores Ctrl-C, which is the parent's to hear, and computes with one
-thread. What anything prints goes where standard error goes: into a log.
+The process dies with its parent however that ends, ignores Ctrl-C, which the parent handles, and computes with one
+thread. All printed output goes to standard error and so into a log.
 """
 
 from __future__ import annotations
@@ -19,38 +19,44 @@ from ..console import missing_library
 from .dispatcher import Answer, Job
 
 PR_SET_PDEATHSIG = 1
+"""Option of Linux's prctl: signal to send when the parent dies."""
 THREADS = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "NUMBA")
-"""Libraries that would use all cores."""
+"""Libraries that would otherwise use all cores."""
 
 
 class JobHandler(Protocol):
-    """Does jobs one after the other."""
+    """Handler that does jobs one after the other."""
 
     def do(self, job: Job) -> Answer:
-        """The answer to a job."""
+        """Return the answer to a job."""
         ...
 
     def close(self) -> None:
-        """Leave nothing behind."""
+        """Release everything."""
         ...
 
 
 def one_thread() -> dict[str, str]:
-    """The environment variables that keep libraries at one thread."""
+    """Return the environment variables that restrict libraries to one thread."""
     return {f"{name}_NUM_THREADS": "1" for name in THREADS}
 
 
 def die_with(parent: int) -> None:
-    """Let the kernel end this process when its parent ends; a stopped process too."""
+    """Let the kernel kill this process, even a stopped one, when its parent ends."""
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 
 
 def serve(handler: JobHandler, parent: int, output: int) -> None:
-    """Answer jobs from standard input, until it is closed, into a file descriptor.
+    """Answer jobs from standard input until it is closed.
 
-    An exception is a mistake in this project or in an installation: it is answered as {"crash": text}.
+    An exception is a bug in this project or in an installation; it is answered by {"crash": text}.
+
+    Args:
+        handler: does the jobs.
+        parent: process id of the parent.
+        output: file descriptor for the answers.
     """
     die_with(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -63,7 +69,12 @@ def serve(handler: JobHandler, parent: int, output: int) -> None:
 
 
 def answered(handler: JobHandler, job: Job) -> Answer:
-    """The answer to a job, whatever happens."""
+    """Return the answer to a job; exceptions become "crash", or "refused" for a missing library.
+
+    Args:
+        handler: does the job.
+        job: the job.
+    """
     try:
         return handler.do(job)
     except Exception as error:
@@ -74,7 +85,7 @@ def answered(handler: JobHandler, job: Job) -> Answer:
 
 
 def main(handler: JobHandler) -> None:
-    """Entry of the process; arguments: the parent's id, and where answers go."""
-    # what libraries print must not end up in the user's terminal
+    """Run the worker process; its command-line arguments are the parent's id and the file descriptor for answers."""
+    # output of libraries must not reach the user's terminal
     os.dup2(2, 1)
     serve(handler, int(sys.argv[1]), int(sys.argv[2]))

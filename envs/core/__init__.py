@@ -1,1 +1,1 @@
-"""What all tasks have in common."""
+"""Parts shared by all tasks: base class, levels, obstacle placement, progress, spaces."""

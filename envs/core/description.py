@@ -1,4 +1,4 @@
-"""The static description of a task: what every policy may know before the first observation."""
+"""Static description of a task: everything a policy may know before the first observation."""
 
 from __future__ import annotations
 
@@ -6,10 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Obstacle, Shape
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import Body
+from ...planner import Arm, Body, Obstacle, Pose, Shape
 from ..scene.scene_objects import Book, FreeBody, Furniture, Glass, extents
 
 FAILURES = (
@@ -22,7 +19,7 @@ FAILURES = (
     "blocked",
     "off_table",
 )
-"""Every reason that an episode may fail for, in `info["failure_reason"]` and in reports."""
+"""Possible failure reasons of an episode, in `info["failure_reason"]` and in reports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +28,9 @@ class TaskObject:
 
     Attributes:
         name: unique name.
-        shape: it, or the hull of it, centered on its frame.
-        yaw_symmetry: smallest yaw [rad] after which the object looks the same; 2 pi if it never does, 0 if it is
-            round.
+        shape: shape of the object, or its hull, centered on the object's frame.
+        yaw_symmetry: smallest yaw [rad] after which the object looks the same; 2 pi without symmetry, 0 for a round
+            object.
     """
 
     name: str
@@ -42,7 +39,7 @@ class TaskObject:
 
     @staticmethod
     def of(thing: FreeBody | Glass | Book) -> TaskObject:
-        """What a policy may know of a thing."""
+        """Describe a movable object of a scene."""
         return TaskObject(thing.name, thing.shape, thing.yaw_symmetry)
 
     @property
@@ -52,7 +49,7 @@ class TaskObject:
 
     @property
     def symmetric_yaws(self) -> tuple[float, ...]:
-        """All yaws [rad] in [0, 2 pi) after which the object looks the same; (0,) for a round one, which has no end."""
+        """Yaws [rad] in [0, 2 pi) after which the object looks the same; (0,) for a round object."""
         if self.yaw_symmetry == 0.0:
             return (0.0,)
         return tuple(np.arange(round(2 * np.pi / self.yaw_symmetry)) * self.yaw_symmetry)
@@ -60,11 +57,11 @@ class TaskObject:
 
 @dataclass(frozen=True, slots=True)
 class TaskFurniture:
-    """What does not move within an episode, but may stand elsewhere in the next.
+    """Furniture: fixed within an episode, possibly moved between episodes.
 
     Attributes:
         name: unique name.
-        parts: its solids, in its own frame.
+        parts: solids in the furniture's frame.
     """
 
     name: str
@@ -72,34 +69,34 @@ class TaskFurniture:
 
     @staticmethod
     def of(thing: Furniture) -> TaskFurniture:
-        """What a policy may know of a thing."""
+        """Describe a piece of furniture of a scene."""
         return TaskFurniture(
             thing.name, tuple(Obstacle(part.shape, part.pose, name=thing.name) for part in thing.parts)
         )
 
     def at(self, pose: Pose) -> tuple[Obstacle, ...]:
-        """Its solids in the world."""
+        """Return the solids in the world frame for a given pose of the furniture."""
         return tuple(Obstacle(part.shape, pose @ part.pose, name=part.name) for part in self.parts)
 
 
 @dataclass(frozen=True, slots=True)
 class TaskDescription:
-    """What is known and constant: robot, time step, objects, table.
+    """Constant facts about a task: robot, time step, objects, table.
 
     Attributes:
         name: task name ("stack").
         robot: robosuite's name of the robot.
-        arms: one kinematic chain per arm, in the order of the observation; world frame as observed.
-        control_dt: seconds between actions.
-        objects: in the order of `object_pose`.
-        bodies: per arm the capsules that contain it, gripper included; see `planner.body`.
+        arms: kinematic chains, one per arm, in the order of the observation; world frame as observed.
+        control_dt: time between actions [s].
+        objects: movable objects in the order of `object_pose`.
+        bodies: capsules that contain the arms, grippers included, one body per arm; see `planner.robot.body`.
         table_height: z of the table top [m].
-        fixtures: what stands still for ever: the table (named "table"), the robot's stand; no floor.
+        fixtures: solids that never move: the table (named "table") and the robot's stand, without the floor.
         gripper_width: largest distance between the finger pads [m], one per arm.
-        furniture: in the order of `furniture_pose`.
-        touching: pairs (part of a body, fixture) that nobody needs to look at: a shoulder and the trunk it sits in.
-        obstacles: how many there can be, the length of `obstacle_active`.
-        control_mode: what an action means; see the environment.
+        furniture: furniture in the order of `furniture_pose`.
+        touching: pairs (body part, fixture) exempt from collision checks, such as a shoulder and the trunk it sits in.
+        obstacles: largest number of obstacles, the length of `obstacle_active`.
+        control_mode: meaning of an action; see the environment.
     """
 
     name: str

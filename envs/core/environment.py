@@ -1,4 +1,4 @@
-"""What all tasks share: the Gymnasium interface around a simulation."""
+"""Base class of all tasks: the Gymnasium interface around a simulation."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from typing import Any, Generic, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from ...planner.errors import BadAction, BadOption, NoRoom, UnknownName
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Obstacle as FreeBody
+from ...planner import Obstacle as FreeBody
+from ...planner import Pose
+from ...planner.errors import BadOption, UnknownName
+from ..errors import BadAction, NoRoom
 from ..scene.robot_description import robot_parts
+from ..scene.robots import Robot
 from ..scene.scene import OBSTACLE
 from ..scene.scene_objects import TABLE_HEIGHT, SceneSpec
 from ..simulation.moving_obstacles import ScheduledObstacle
@@ -24,44 +26,50 @@ from ..simulation.twist_control import TwistDrive
 from . import spaces as space
 from .description import TaskDescription, TaskFurniture, TaskObject
 from .levels import checked_obstacles, level_named
-from .obstacle_placement import ObstacleRequest, PlacementContext, PlacementMotion, placed
+from .obstacle_placement import placed
+from .placement_context import ObstacleRequest, PlacementContext, PlacementMotion
 from .progress import Progress
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
 SLOTS = 3
-"""Obstacles that there can be at once."""
+"""Largest number of obstacles at once."""
 MAX_LAYOUTS = 40
-"""Starts that are drawn before a place for the obstacles must have been found."""
+"""Largest number of starts drawn per reset until the obstacles fit."""
 Observation = dict[str, np.ndarray]
 ProgressT = TypeVar("ProgressT", bound=Progress)
-"""What keeps the progress of a task."""
+"""Progress class of a task."""
 
 
 def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
-    """The value if it is among the known ones.
+    """Return the value if it is one of the known ones.
+
+    Args:
+        option: name of the option, for the message.
+        value: value to check.
+        known: allowed values.
 
     Raises:
-        UnknownName: it is not.
+        UnknownName: the value is not among them.
     """
     if not isinstance(value, str) or value not in known:
         raise UnknownName(option, value, known)
     return value
 
 
-class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
+class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
     """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator.
 
     Args:
-        name: of the task.
-        goals: how many goal poses there are.
+        name: task name.
+        goals: number of goal poses.
         motions: largest motion index.
-        more: entries of the observation that only this task has.
-        things: what there is besides the robot.
-        view: where the camera is.
+        more: task-specific entries of the observation.
+        things: scene contents besides the robot.
+        view: camera view.
 
-    The others are those of every environment, see their docstrings.
+    All environments share the other arguments and describe them in their docstrings.
     """
 
     _goal_pose: np.ndarray
@@ -73,7 +81,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         self,
         *,
         name: str,
-        robot: str,
+        robot: Robot,
         things: SceneSpec,
         goals: int,
         motions: int,
@@ -105,17 +113,17 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         self._action = np.zeros(self.action_space.shape or ())
         self._renderer: Renderer | None = None
         self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
-        self._task = self._described(name, robot, things)
+        self._task = self._described(name, things)
         widths, objects = self._task.gripper_width, len(things.objects)
         self.observation_space = space.observation_space(
             self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
         )
 
-    def _described(self, name: str, robot: str, things: SceneSpec) -> TaskDescription:
-        parts = robot_parts(robot, self.sim.scene)
+    def _described(self, name: str, things: SceneSpec) -> TaskDescription:
+        parts = robot_parts(self.sim.scene)
         return TaskDescription(
             name=name,
-            robot=robot,
+            robot=self.sim.scene.robot.name,
             arms=self.arms,
             control_dt=self.control_dt,
             objects=tuple(TaskObject.of(each) for each in things.objects),
@@ -131,40 +139,49 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
 
     @property
     def task(self) -> TaskDescription:
-        """What every policy may know beforehand."""
+        """Constant facts that a policy may know before the first observation."""
         return self._task
 
     @property
     def control_dt(self) -> float:
-        """Seconds between actions."""
+        """Time between actions [s]."""
         return self.substeps * PHYSICS_DT
 
     @abstractmethod
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        """Where things are in a new episode, obstacles aside; sets `_goal_pose`, `_progress` and the task's own state.
+        """Return the start of an episode, without obstacles; set `_goal_pose`, `_progress` and the task's own state.
 
         Args:
-            options: those of `reset`, but for "level" and "obstacles"; unknown keys are refused.
+            options: options of `reset`, except "level" and "obstacles"; unknown keys are refused.
             layout: name of the ranges to draw from.
-            spacious: there will be obstacles, which need room.
+            spacious: whether obstacles will be placed, which need clearance.
         """
 
     @abstractmethod
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """The motions of the hand that obstacles are put in the way of, in order."""
+        """Return the hand's motions that obstacles may block, in order."""
 
     def _ghosts(self) -> list[Ghost]:
-        """What is drawn but not there: the goals, if they are places of objects."""
+        """Return the shapes drawn without being simulated: the goals, if they are places of objects."""
         return []
 
-    def _paper(self, legs: list[PlacementMotion]) -> list[ObstacleRequest]:
-        """The paper's obstacles."""
+    def _paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
+        """Return the obstacles of the paper's experiment."""
         raise BadOption("obstacles", f"the paper shows no obstacle in {self.task.name}")
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode; the same seed and options give the same bits."""
+        """Start an episode; the same seed and options give bitwise identical episodes.
+
+        Args:
+            seed: seed of the episode's random numbers; None: continue the random sequence.
+            options: start options, see the environment's docstring.
+
+        Raises:
+            UnknownName: an unknown option, level or kind of obstacles.
+            BadOption: an unusable value, or no start with clearance for the obstacles (`NoRoom`).
+        """
         super().reset(seed=seed)
         self._steps = self._contacts = 0
         self._action[:] = 0.0
@@ -174,7 +191,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         return observation, info
 
     def _started(self, options: dict[str, Any]) -> Start:
-        """A start with its obstacles; starts beside which none has room are drawn anew."""
+        """Return a start with its obstacles; draw another start while the obstacles do not fit."""
         level = level_named(options.pop("level", self.level))
         wanted = level.obstacles if self.obstacles is None else self.obstacles
         wanted = checked_obstacles(options.pop("obstacles", wanted), SLOTS)
@@ -190,18 +207,20 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
     def _scheduled_obstacles(self, kind: str, start: Start) -> tuple[ScheduledObstacle, ...] | None:
         if kind == "none":
             return ()
-        task, legs = self.task, self._placement_motions(start)
+        task, motions = self.task, self._placement_motions(start)
         things = []
         for each, pose in zip(task.objects, start.objects, strict=True):
             things.append(FreeBody(each.shape, Pose.from_vector(pose), name=each.name))
         for each, pose in zip(task.furniture, start.furniture, strict=True):
             things += each.at(Pose.from_vector(pose))
         solids = [*task.fixtures, *things]
-        stage = PlacementContext(legs, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height)
-        return placed(self.np_random, kind, stage, self._paper(legs) if kind == "paper" else None)
+        stage = PlacementContext(
+            motions, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height
+        )
+        return placed(self.np_random, kind, stage, self._paper(motions) if kind == "paper" else None)
 
     def _reached(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """What Gymnasium wants to know of the state that the simulation is in."""
+        """Return Gymnasium's step results for the current state of the simulation."""
         state = self.sim.read()
         reward, terminated, info = self._judge(state)
         if self.sim.obstacles.scheduled_obstacles:
@@ -214,7 +233,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         return self._observation(state), reward, terminated, False, info
 
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
-        """Reward, terminated and info of the state just reached."""
+        """Return reward, terminated and info of the state just reached."""
         progress = self._progress
         verdict = progress.update(state)
         if verdict.unwanted:
@@ -223,7 +242,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         return reward, progress.success or progress.failed, progress.info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Act for one control step.
+        """Apply an action for one control step.
 
         Raises:
             BadAction: not an array of real numbers, of the wrong shape, or not finite.
@@ -241,13 +260,13 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         return self._reached()
 
     def render(self) -> np.ndarray | None:
-        """An image (height, width, 3) uint8 in the mode "rgb_array"; OpenGL is opened by the first call."""
+        """Return an image (height, width, 3) uint8 in the mode "rgb_array"; the first call opens OpenGL."""
         if self.render_mode != "rgb_array":
             return None
         return self._opened_renderer().image(self.sim.data, self._ghosts())
 
     def close(self) -> None:
-        """Close the window or the image buffer, if there is one."""
+        """Close the window or the image buffer, if open."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
@@ -261,7 +280,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         return self._renderer
 
     def _take(self, action: np.ndarray) -> None:
-        """Copy an action, of whatever array type, to where the compiled code reads it."""
+        """Copy an action of any array type into the buffer that the compiled code reads."""
         if type(action) is not np.ndarray or action.dtype != np.float64:
             try:
                 action = np.asarray(action)
@@ -296,7 +315,7 @@ class OneDemoEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         }
 
     def _more_observed(self, state: State) -> Observation:
-        """Entries of the observation that only some tasks have."""
+        """Return the task-specific entries of the observation."""
         return {}
 
 

@@ -1,4 +1,4 @@
-"""Levels of difficulty: how far a start may differ, and what is in the way. The same names for every task."""
+"""Difficulty levels: spread of the starts and kind of obstacles, with the same names for every task."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from ...planner.errors import BadOption, UnknownName
 from ..simulation.moving_obstacles import ScheduledObstacle
 
 OBSTACLES = ("none", "static", "appear", "moving", "unforeseen", "forearm", "paper")
-"""Kinds: still ones on the way of the hand; one that appears in the middle of a motion; one that swings across the
-way; one of the last two, drawn; a still one where the forearm passes; and what the paper's experiment has."""
+"""Kinds of obstacles: static ones on the hand's path; one that appears during a motion; one that swings across the
+path; one of the last two, drawn at random ("unforeseen"); a static one where the forearm passes; and the paper's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """What a level's name stands for.
+    """Starts and obstacles of a level.
 
     Attributes:
-        layout: name of the ranges that starts and goals are drawn from, "L0", "L1" or "L2".
-        obstacles: their kind.
+        layout: name of the ranges from which starts and goals are drawn, "L0", "L1" or "L2".
+        obstacles: kind of obstacles, see `OBSTACLES`.
     """
 
     layout: str
@@ -36,12 +36,13 @@ LEVELS = {
     "S": Level("L1"),
     "T": Level("L1"),
 }
-"""R is L1 on another robot, S with a few key poses of the demonstration, T with the hand moved in another frame: starts
-and goals are those of L1, the rest is the run's to do (the keys `robot`, `key_poses` and `tool` of its cells)."""
+"""Levels by name. R is L1 on another robot, S L1 with a few key poses of the demonstration, T L1 with the hand
+commanded in another frame: starts and goals are those of L1, the run does the rest (keys `robot`, `key_poses` and
+`tool` of its cells)."""
 
 
 def level_named(name: object) -> Level:
-    """The level of a name.
+    """Return the level with a given name.
 
     Raises:
         UnknownName: no such level.
@@ -52,7 +53,11 @@ def level_named(name: object) -> Level:
 
 
 def checked_obstacles(value: object, slots: int) -> str | tuple[ScheduledObstacle, ...]:
-    """A kind of obstacles, or obstacles themselves.
+    """Return a kind of obstacles, or given obstacles as a tuple, after checking them.
+
+    Args:
+        value: kind from `OBSTACLES`, or a list or tuple of obstacles.
+        slots: largest number of obstacles.
 
     Raises:
         UnknownName: no such kind.
@@ -63,7 +68,9 @@ def checked_obstacles(value: object, slots: int) -> str | tuple[ScheduledObstacl
             raise UnknownName("obstacles", value, OBSTACLES)
         return value
     if not isinstance(value, tuple | list) or not all(isinstance(each, ScheduledObstacle) for each in value):
-        raise BadOption("obstacles", f"{value!r} is neither one of {', '.join(OBSTACLES)} nor a list of Intruder")
+        raise BadOption(
+            "obstacles", f"{value!r} is neither one of {', '.join(OBSTACLES)} nor a list of ScheduledObstacle"
+        )
     if len(value) > slots:
         raise BadOption("obstacles", f"there are {len(value)}; at most {slots} are possible")
     return tuple(value)

@@ -1,4 +1,4 @@
-"""What the progress of every task has in common: settling, unwanted contacts, and the common entries of `info`."""
+"""Progress common to all tasks: settling, unwanted contacts and the common entries of `info`."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any, Protocol
 from ..simulation.state import State
 
 SETTLED_SECONDS = 0.5
-"""For how long a success must last."""
+"""Time [s] for which the goal must hold without interruption to count as success."""
 
 
 class Contacts(Protocol):
-    """What every verdict says of unwanted contacts.
+    """Unwanted contacts in the verdict on a state.
 
     Attributes:
-        unwanted: pairs that touch and should not.
-        low: the smaller owner of the last of them, or -1.
-        high: the other owner.
+        unwanted: number of pairs in unwanted contact.
+        low: smaller owner of the last such pair, or -1.
+        high: larger owner of the last such pair, or -1.
     """
 
     @property
@@ -31,14 +31,14 @@ class Contacts(Protocol):
 
 
 class Progress(ABC):
-    """What has happened in an episode so far, renewed from the simulator's state at each step.
+    """Progress of an episode, updated from the simulator's state at each step.
 
     Args:
-        dt: seconds between states.
+        dt: time between states [s].
 
     Attributes:
-        collisions: unwanted contacts so far, counted in every step.
-        collision: name of the last of them.
+        collisions: number of unwanted contacts so far, counted in every step.
+        collision: name of the most recent unwanted contact.
     """
 
     def __init__(self, dt: float):
@@ -48,43 +48,43 @@ class Progress(ABC):
 
     @property
     def success(self) -> bool:
-        """What must be has been for long enough."""
+        """True once the goal has held for `SETTLED_SECONDS`."""
         return self._settled_steps >= self._needed
 
     @property
     @abstractmethod
     def failed(self) -> bool:
-        """Nothing that can be done would be a success any more."""
+        """True if the task can no longer succeed."""
 
     @property
     @abstractmethod
     def motion_index(self) -> float:
-        """See the observation of the task."""
+        """Index of the current motion; see the observation of the task."""
 
     @property
     @abstractmethod
     def stage(self) -> str:
-        """The furthest progress in words."""
+        """Furthest progress in words."""
 
     @property
     @abstractmethod
     def failure(self) -> str:
-        """Why it cannot succeed as things are, "" if it can."""
+        """Reason why the task cannot succeed at present, "" if it can."""
 
     @abstractmethod
     def update(self, state: State) -> Contacts:
-        """Take in a new state."""
+        """Judge a new state, update the progress and return the verdict."""
 
     @abstractmethod
     def reward(self, state: State) -> float:
-        """The dense reward in [0, 1] of the state taken in last."""
+        """Return the dense reward in [0, 1] of the last state given to `update`."""
 
     @abstractmethod
     def task_info(self) -> dict[str, Any]:
-        """The task's own entries of `info`."""
+        """Return the task-specific entries of `info`."""
 
     def info(self) -> dict[str, Any]:
-        """The entries of `info`."""
+        """Return the entries of `info`."""
         success = self.success
         return {
             "is_success": success,
@@ -97,6 +97,6 @@ class Progress(ABC):
         }
 
     def _settle(self, settled: bool, verdict: Contacts) -> None:
-        """Count a step that is as it must be, or begin anew; and its unwanted contacts."""
+        """Count consecutive settled steps and unwanted contacts."""
         self._settled_steps = self._settled_steps + 1 if settled else 0
         self.collisions += verdict.unwanted

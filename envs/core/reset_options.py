@@ -1,4 +1,4 @@
-"""Checks of what a caller gives to `reset(options=...)`."""
+"""Checks of the options given to `reset(options=...)`."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from ...planner import Arm
 from ...planner.errors import BadOption, UnknownName
-from ...planner.robot.arm import Arm
 
 
 def check_known(options: Iterable[str], known: tuple[str, ...]) -> None:
     """Refuse reset options that a task does not have.
 
+    Args:
+        options: names of the given options.
+        known: names of the task's options.
+
     Raises:
-        UnknownName: one is not among the known ones.
+        UnknownName: a given option is not among the known ones.
     """
     for key in options:
         if key not in known:
@@ -23,10 +27,15 @@ def check_known(options: Iterable[str], known: tuple[str, ...]) -> None:
 
 
 def checked_array(option: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """The value as a finite float64 array of a shape.
+    """Return the value as a finite float64 array of the given shape.
+
+    Args:
+        option: name of the option, for the message.
+        value: numbers in any array-like form.
+        shape: required shape.
 
     Raises:
-        BadOption: it is not.
+        BadOption: the value is not numeric, of another shape, or not finite.
     """
     try:
         array = np.array(value, dtype=np.float64)
@@ -41,7 +50,16 @@ def checked_array(option: str, value: Any, shape: tuple[int, ...]) -> np.ndarray
 
 
 def checked_poses(option: str, value: Any, count: int) -> np.ndarray:
-    """Poses (count, 7) with unit quaternions."""
+    """Return poses (count, 7) with unit quaternions.
+
+    Args:
+        option: name of the option, for the message.
+        value: poses (count, 7), x y z [m] and wxyz with a norm within 1e-3 of 1.
+        count: number of poses.
+
+    Raises:
+        BadOption: the value is not such an array.
+    """
     poses = checked_array(option, value, (count, 7))
     norms = np.linalg.norm(poses[:, 3:], axis=1)
     if (np.abs(norms - 1.0) > 1e-3).any():
@@ -52,7 +70,15 @@ def checked_poses(option: str, value: Any, count: int) -> np.ndarray:
 
 
 def checked_joints(value: Any, arms: tuple[Arm, ...]) -> np.ndarray:
-    """Joints (n_arms, dof) within the limits; for one arm (dof,) does too."""
+    """Return joints (n_arms, dof) [rad] within the limits.
+
+    Args:
+        value: joints (n_arms, dof) [rad]; for one arm also (dof,).
+        arms: kinematics of the arms, with their limits.
+
+    Raises:
+        BadOption: the value has another shape, or a joint is outside its limits.
+    """
     shape = (len(arms), arms[0].dof)
     flat = np.ndim(value) == 1 and len(arms) == 1
     joints = checked_array("joint_positions", [value] if flat else value, shape)

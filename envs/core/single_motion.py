@@ -1,4 +1,4 @@
-"""What the tasks of one object have in common, for those who train: when an episode ends, and the goal form."""
+"""Base class of the single-object tasks for training: end of an episode, and the goal form."""
 
 from __future__ import annotations
 
@@ -13,45 +13,45 @@ from gymnasium.spaces.utils import flatten, flatten_space
 from ...planner.errors import BadOption
 from ..simulation.state import State
 from . import spaces as space
-from .environment import Observation, OneDemoEnv, ProgressT
+from .environment import Observation, ProgressT, TaskEnv
 from .levels import level_named
 
 FREQUENCY = 20
-"""Of actions [Hz]."""
+"""Default action frequency [Hz]."""
 HORIZON = 150
-"""Actions of an episode."""
+"""Actions per episode."""
 LAST_ACTION = "last_action"
 TOLD_BY_GOALS = ("goal_pose", "motion_index")
-"""Entries that say what is desired, or whether it is reached: they would contradict goals that are exchanged."""
+"""Observation entries that tell the goal, or whether it is reached: they would contradict relabeled goals."""
 
 
 class Agreement(NamedTuple):
-    """How well achieved goals agree with desired ones.
+    """Agreement of achieved goals with desired ones.
 
     Attributes:
-        close: (...) in [0, 1], 1 where nothing is missing; see `shaping`.
-        reached: (...) whether it is within the task's tolerances.
+        close: (...) closeness in [0, 1], 1 without error; see `dense_reward`.
+        reached: (...) whether the error is within the task's tolerances.
     """
 
     close: np.ndarray
     reached: np.ndarray
 
 
-class SubTask(OneDemoEnv[ProgressT]):
-    """A task of one object; see the tasks' own docstrings."""
+class SingleMotionEnv(TaskEnv[ProgressT]):
+    """A single-object task; see the tasks' own docstrings."""
 
     GOAL_BOUNDS: tuple[float, ...]
-    """Bounds of a goal's entries, one for each of them."""
+    """Bounds of a goal's entries, one per entry."""
 
     def _take_form(self, name: str, goal_form: bool, end_on_success: bool | None, *, obstacles: bool = True) -> None:
-        """Take over what the base class does not know; for the end of a constructor."""
+        """Set up options and spaces that the base class does not know; to be called last in a constructor."""
         for option, value in (("goal_form", goal_form), ("end_on_success", end_on_success)):
             if not isinstance(value, bool) and not (value is None and option == "end_on_success"):
                 raise BadOption(option, f"{value!r} is neither True nor False")
         self._task = replace(self._task, name=name)
         self.goal_form, self._obstacles_possible = goal_form, obstacles
         seen: Any = self.observation_space
-        # what is told to the servos is felt some actions later: without it a learner sees but half of the state
+        # the servos respond some actions late: without the last action a learner sees only half of the state
         self.observation_space: Any = gym.spaces.Dict({**seen.spaces, LAST_ACTION: self.action_space})
         self._check_way(level_named(self.level).obstacles if self.obstacles is None else self.obstacles)
         dense = self.reward_kind == "dense" or goal_form
@@ -77,23 +77,28 @@ class SubTask(OneDemoEnv[ProgressT]):
 
     @abstractmethod
     def achieved_goal(self, state: State) -> np.ndarray:
-        """(g,) what a state has achieved, to compare with `desired_goal`."""
+        """Return the goal (g,) that a state has achieved, comparable to `desired_goal`."""
 
     @abstractmethod
     def desired_goal(self) -> np.ndarray:
-        """(g,) what is to be achieved."""
+        """Return the desired goal (g,)."""
 
     @abstractmethod
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
-        """How well goals (..., g) agree."""
-
-    def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any) -> Any:
-        """Reward of the goal form for any goals: 1 where achieved and desired agree, else 0; or how close they are.
+        """Return how well achieved goals agree with desired ones.
 
         Args:
-            achieved_goal: (g,) or (n, g).
-            desired_goal: of the same shape.
-            info: not used; Gymnasium's goal environments have it.
+            achieved: (..., g) achieved goals.
+            desired: (..., g) desired goals.
+        """
+
+    def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any) -> Any:
+        """Return the goal form's reward: 1 where goals agree, else 0; with dense rewards, the closeness of the goals.
+
+        Args:
+            achieved_goal: (g,) or (n, g) achieved goals.
+            desired_goal: desired goals of the same shape.
+            info: unused; required by Gymnasium's goal environments.
         """
         found = self.agreement(np.asarray(achieved_goal, dtype=np.float64), np.asarray(desired_goal, dtype=np.float64))
         if self.reward_kind == "dense":
@@ -125,10 +130,16 @@ class SubTask(OneDemoEnv[ProgressT]):
 
 
 def turned_by(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) -> np.ndarray:
-    """(...) angles [rad] between quaternions (..., 4), wxyz; half turns about the own z axis not counted if asked."""
+    """Return the angles (...) [rad] between quaternions, wxyz.
+
+    Args:
+        achieved: (..., 4) quaternions.
+        desired: (..., 4) quaternions.
+        half_turns: whether half turns about the own z axis are ignored.
+    """
     w = np.abs((achieved * desired).sum(axis=-1))
     if half_turns:
-        # the last entry of conj(achieved) desired
+        # the last entry of the product conj(achieved) desired
         a, b = np.moveaxis(achieved, -1, 0), np.moveaxis(desired, -1, 0)
         w = np.maximum(w, np.abs(a[0] * b[3] - a[3] * b[0] - a[1] * b[2] + a[2] * b[1]))
     norms = np.linalg.norm(achieved, axis=-1) * np.linalg.norm(desired, axis=-1)
@@ -136,7 +147,13 @@ def turned_by(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) ->
 
 
 def gaps(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Distances (...) [m] and angles (...) [rad] between poses (..., 7)."""
+    """Return the distances (...) [m] and angles (...) [rad] between poses.
+
+    Args:
+        achieved: (..., 7) poses, x y z [m] and wxyz.
+        desired: (..., 7) poses, likewise.
+        half_turns: whether half turns about the own z axis are ignored.
+    """
     angle = turned_by(achieved[..., 3:7], desired[..., 3:7], half_turns=half_turns)
     distance = np.linalg.norm(achieved[..., :3] - desired[..., :3], axis=-1)
     return distance, angle

@@ -7,22 +7,28 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from ...planner.robot.arm import Arm
+from ...planner import Arm
 
 REACH = 3.0
-"""Bound of world coordinates [m]; what leaves it has long fallen off the table."""
+"""Bound of world coordinates [m]; an object beyond it has long fallen off the table."""
 JOINT_SLACK = 0.1
-"""A soft joint limit gives way by less than this [rad]."""
+"""Bound of a joint's excursion beyond its soft limit [rad]."""
 LARGEST_OBSTACLE, FASTEST_OBSTACLE = 1.0, 2.0
 """Bounds of an obstacle's extents [m] and speed [m/s]."""
 LOOSE = 1.5
-"""Bound of the gap between the pads by the widest: fingers on linkages give way when the hand is swung."""
+"""Bound of the gap between the pads relative to the widest gap: fingers on linkages give way when the hand swings."""
 MAX_SPEED = 20.0
-"""Bound of measured joint speeds [rad/s]; the servos command at most 3."""
+"""Bound of measured joint speeds [rad/s]; the servos command at most 5."""
 
 
 def box(low: np.ndarray | float, high: np.ndarray | float, shape: tuple[int, ...]) -> spaces.Box:
-    """A float64 box of a shape, from numbers or arrays that broadcast to it."""
+    """Return a float64 box of a given shape.
+
+    Args:
+        low: lower bounds, a number or an array that broadcasts to the shape.
+        high: upper bounds, likewise.
+        shape: shape of the box.
+    """
     return spaces.Box(
         np.broadcast_to(np.asarray(low, dtype=np.float64), shape).copy(),
         np.broadcast_to(np.asarray(high, dtype=np.float64), shape).copy(),
@@ -31,7 +37,7 @@ def box(low: np.ndarray | float, high: np.ndarray | float, shape: tuple[int, ...
 
 
 def pose_box(count: int) -> spaces.Box:
-    """Poses (count, 7): x y z [m] and wxyz."""
+    """Return the space of poses (count, 7): x y z [m] and wxyz."""
     bound = np.array([REACH] * 3 + [1.0] * 4)
     return box(-bound, bound, (count, 7))
 
@@ -45,16 +51,16 @@ def observation_space(
     obstacles: int,
     **more: spaces.Box,
 ) -> spaces.Space[Any]:
-    """The observation of a task; its entries are described in the environment's docstring.
+    """Return the observation space of a task; the environment's docstring describes its entries.
 
     Args:
-        arms: their joints.
-        gripper_width: widest gaps [m].
+        arms: kinematics of the arms, with their joint limits.
+        gripper_width: widest gaps between the finger pads [m], one per arm.
         objects: number of free objects.
-        goals: number of goals.
+        goals: number of goal poses.
         motions: largest motion index.
-        obstacles: number of slots.
-        more: entries of this task alone.
+        obstacles: largest number of obstacles.
+        more: task-specific entries.
     """
     shape = (len(arms), arms[0].dof)
     lower = np.stack([arm.lower for arm in arms]) - JOINT_SLACK
@@ -79,5 +85,10 @@ def observation_space(
 
 
 def action_space(entries_per_arm: int, arms: int) -> spaces.Box:
-    """Normalized actions: per arm the entries of the control mode, then its gripper."""
+    """Return the space of normalized actions: per arm the entries of the control mode, then its gripper.
+
+    Args:
+        entries_per_arm: number of entries of the control mode, the gripper excluded.
+        arms: number of arms.
+    """
     return box(-1.0, 1.0, (arms * (entries_per_arm + 1),))

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ...planner import Pose
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import Pose
 from ...planner.geometry.shapes import pack
 from ..core import spaces as space
-from ..core.environment import OneDemoEnv
-from ..core.obstacle_placement import PlacementMotion
+from ..core.environment import TaskEnv
+from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints
 from ..scene.beads import poured_into
 from ..scene.body_clearance import arm_clearance
@@ -26,32 +26,38 @@ from .geometry import SOURCE, TARGET, level_hand
 from .rules import PourProgress
 
 ARMS = ("right", "left")
-"""The right hand holds the source, the left one the target."""
+"""Names of the arms: the right hand holds the source, the left one the target."""
 GLASSES = (Glass("source", radius=0.023, height=0.12), Glass("target", radius=0.027))
 BEADS = Beads()
 GRASP_HEIGHTS = (0.060, 0.045)
-"""Of the fingers above the glasses' bottoms [m]."""
+"""Heights of the fingers above the glasses' bottoms [m]."""
 READY = (
     (-0.03, 0.32, 1.84, 1.34, 2.51, -0.63, -1.27),
     (0.14, 0.18, -1.44, 1.53, -0.11, 0.44, -1.25),
 )
-"""Baxter's joints [rad] near which hands are looked for: elbows out, wrists in front of it."""
+"""Baxter's joints [rad] that seed inverse kinematics: elbows out, wrists in front of the robot."""
 PLACES = ((0.14, -0.22, 1.22), (0.22, 0.16, 1.18))
 """Nominal centers [m] of the glasses at the start."""
 YAWS = np.deg2rad((60.0, -60.0))
-"""Nominal directions [rad] of the level hands."""
+"""Nominal approach directions [rad] of the level hands."""
 OPTIONS = ("level", "obstacles", "joint_positions")
 CLEARANCE, MARGIN = 0.03, 0.1
-"""Least distance [m] of an arm at the start to what stands there, and to its joints' limits [rad]."""
+"""Least distance [m] of an arm at the start to the fixtures, and to its joint limits [rad]."""
 APART = 0.22
-"""Least distance of the glasses' axes at the start [m]: two hands have room."""
+"""Least distance of the glasses' axes at the start [m], so that both hands fit."""
 MAX_STARTS = 500
 VIEW = View((0.0, 0.0, 1.1), 2.0, 160.0, -15.0)
 
 
 @dataclass(frozen=True, slots=True)
 class BimanualPourRanges:
-    """How far a start may differ: shift of a glass in x, y and z [m], turn of a hand [rad], change of a joint [rad]."""
+    """Ranges of a start around the nominal one.
+
+    Attributes:
+        place: largest shift of a glass in x, y and z [m].
+        yaw: largest turn of a hand [rad].
+        joints: largest change of a joint of the seed [rad].
+    """
 
     place: float
     yaw: float
@@ -63,18 +69,18 @@ RANGES = {
     "L1": BimanualPourRanges(0.05, np.deg2rad(15.0), 0.05),
     "L2": BimanualPourRanges(0.15, np.deg2rad(60.0), 0.15),
 }
-"""By the name of a layout, see `levels`; what the arms cannot reach is drawn anew."""
+"""Ranges by layout name, see `levels`; unreachable starts are drawn anew."""
 
 
-class BimanualPourEnv(OneDemoEnv[PourProgress]):
+class BimanualPourEnv(TaskEnv[PourProgress]):
     """Pour the beads of one glass into another, each held by one arm of Baxter from the start.
 
     ## Description
-    The right hand holds the source (46 mm wide, 120 mm high, 80 g) with 30 beads of 12 mm and 1 g that stand for
-    water, the left hand the target (54 mm wide, 100 mm high). The glasses are held by friction between the fingers
-    only, beads fall because they are heavy. Where to pour is free. Success is judged from the simulator: at least
-    90 % of the beads in the target, at most 5 % outside both glasses, the target upright and at rest, for half a
-    second.
+    The right hand holds the source (46 mm wide, 120 mm high, 80 g) with 30 beads of 12 mm and 1 g that represent
+    water, the left hand the target (54 mm wide, 100 mm high). Only friction holds the glasses between the fingers,
+    and the beads move by gravity. The place of pouring is free. Success is judged from the simulator: for half a
+    second at least 90 % of the beads are in the target and at most 5 % outside both glasses, and the target is
+    upright and at rest.
 
     ## Action Space
     `Box(-1, 1, (16,), float64)` at 50 Hz, right arm first; `(14,)` with `control_mode="ee_twist"`.
@@ -84,27 +90,27 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
 
     ## Observation Space
-    A `Dict` of float64 boxes. Poses are `x y z [m]`, then quaternion wxyz. A glass's frame is in the middle of its
+    A `Dict` of float64 boxes. Poses are `x y z [m]`, then quaternion wxyz. A glass's frame is at the center of its
     axis, z up.
 
     | key | shape | meaning |
     |---|---|---|
     | `joint_positions` | (2, 7) | [rad]; right arm, left arm |
     | `joint_velocities` | (2, 7) | [rad/s] |
-    | `tcp_pose` | (2, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `tcp_pose` | (2, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
     | `gripper_opening` | (2,) | gap between the finger pads [m] |
     | `object_pose` | (2, 7) | source and target |
-    | `goal_pose` | (1, 7) | the middle of the target's rim at the start; constant during an episode |
+    | `goal_pose` | (1, 7) | center of the target's rim at the start; constant during an episode |
     | `bead_fraction` | (3,) | share of the beads in the source, in the target, outside both |
-    | `motion_index` | (1,) | 1 while the source is held, 2 while enough is poured |
-    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `motion_index` | (1,) | 1 while the source is held, 2 while enough beads are poured |
+    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
     | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | the obstacles |
-    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+    | `obstacle_pose` | (3, 7) | poses of the obstacles |
+    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
 
     ## Rewards
     `reward="dense"`: in [0, 1], half of it the share of the beads in the target, the other half for holding the
@@ -113,11 +119,11 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
 
     ## Starting State
     The glasses are upright in the hands. By `level`: L0 the nominal places; L1 each glass moved by up to 5 cm in x, y
-    and z and its hand turned by up to 15 degrees about the vertical; L2 by 15 cm and 60 degrees. What an arm cannot
-    reach from its ready posture 0.1 rad away from all joint limits, or not without coming nearer than 3 cm to trunk
-    and table, and glasses less than 22 cm apart, are drawn anew.
+    and z and its hand turned by up to 15 degrees about the vertical; L2 by 15 cm and 60 degrees. A start is drawn
+    anew if an arm cannot reach it from its ready posture with 0.1 rad to all joint limits and 3 cm to trunk and
+    table, or if the glasses are less than 22 cm apart.
 
-    L3, L4 and F are L2 with obstacles on the straight way of the source to where the target is at the start: see
+    L3, L4 and F are L2 with obstacles on the source's straight path to the target's initial place: see
     `onedemo/Pour-v0`. R, S and T start as L1 does.
 
     ## Episode End
@@ -125,16 +131,17 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
     or below. `truncated` after 40 s (Gymnasium's `TimeLimit`).
 
     ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far, of an arm with itself left out), `stage`,
+    `is_success`, `success`, `safe` (no unwanted contact so far; contacts of an arm with itself are ignored), `stage`,
     `failure_reason`, `collision`, `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m],
     `layouts_refused`, `fraction_in_target`, `fraction_outside`, `carry_tilt` [rad] (largest tilt of the source before
     its rim came within 15 cm of the target's axis) and `beads_lost` (most beads outside both glasses until then).
 
     ## Arguments
-    `robot="Baxter"`, `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" |
+    `robot="Baxter"`, `level="L1"`, `obstacles=None` (those of the level) or `"none" | "static" | "appear" |
     "moving" | "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
     `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`,
-    `obstacles` (a kind, or a list of `ScheduledObstacle`) and `joint_positions` (2, 7), which hold the glasses upright.
+    `obstacles` (a kind, or a list of `ScheduledObstacle`) and `joint_positions` (2, 7), which must hold the
+    glasses upright.
 
     ## Version History
     * v0: first version.
@@ -154,10 +161,10 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         if tuple(kind.ready) != ARMS:
             raise BadOption("robot", f"{robot} has one arm; this task needs two: Baxter")
         for glass in GLASSES:
-            kind.check_grip(2.0 * glass.radius, robot, f"the {glass.name}")
+            kind.check_grip(2.0 * glass.radius, f"the {glass.name}")
         super().__init__(
             name="bimanual_pour",
-            robot=robot,
+            robot=kind,
             things=SceneSpec(GLASSES, (), BEADS),
             goals=1,
             motions=2,
@@ -175,7 +182,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         self._place(np.array(READY))
 
     def _place(self, joints: np.ndarray) -> np.ndarray:
-        """Take the start joints (2, dof); the poses (2, 7) of the glasses in the hands."""
+        """Take over the start joints (2, dof); return the poses (2, 7) of the glasses in the hands."""
         held = [
             (arm.fk(q) @ tcp_from_glass(k)).vector for k, (arm, q) in enumerate(zip(self.arms, joints, strict=True))
         ]
@@ -201,7 +208,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         return Start(joints, glasses, beads=beads, grips=np.array([2.0 * glass.radius for glass in GLASSES]))
 
     def _drawn(self, ranges: BimanualPourRanges) -> np.ndarray:
-        """Start joints (2, dof) by rejection: a rule on reach, whatever the method."""
+        """Draw start joints (2, dof) by rejection, by reach alone, independent of any method."""
         rng = self.np_random
         for _ in range(MAX_STARTS):
             places = np.array(PLACES) + rng.uniform(-ranges.place, ranges.place, (2, 3))
@@ -215,7 +222,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         raise BadOption("level", "no start was found that both arms can reach")
 
     def _reachable(self, k: int, place: np.ndarray, yaw: float, seed: np.ndarray) -> np.ndarray | None:
-        """Joints (dof,) of arm k that hold its glass at a place, or None."""
+        """Return joints (dof,) of arm k that hold its glass at a place, or None."""
         arm = self.arms[k]
         rise = np.array([0.0, 0.0, GRASP_HEIGHTS[k] - 0.5 * GLASSES[k].height])
         hand = level_hand(place + rise, yaw)
@@ -226,7 +233,7 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
         return q if clearance >= CLEARANCE else None
 
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """The way of the source to where the target is."""
+        """Return the motion of the source to the target's initial place."""
         hand = self.arms[0].fk(start.joints[0])
         above = Pose.from_position_quaternion(self._goal_pose[0, :3] + [0.0, 0.0, 0.5 * GLASSES[SOURCE].height])
         turned = Pose.from_position_quaternion([0, 0, 0], hand.quaternion)
@@ -240,5 +247,5 @@ class BimanualPourEnv(OneDemoEnv[PourProgress]):
 
 
 def tcp_from_glass(k: int) -> Pose:
-    """How hand k holds its glass: the axis between the pads, along the tcp's y."""
+    """Return the pose of glass k in its hand: the axis between the pads, along the tcp's y."""
     return level_hand(np.array([0.0, 0.0, GRASP_HEIGHTS[k] - 0.5 * GLASSES[k].height]), 0.0).inverse()

@@ -1,4 +1,4 @@
-"""Where the glasses stand at the start of an episode of pouring: levels as data, seeded, independent of any method."""
+"""Start layouts of pouring: levels as data, seeded, independent of any method."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..core.reset_options import checked_array
 from ..scene.scene_objects import TABLE_HEIGHT
 
 LOWEST, HIGHEST = 0.10, 0.40
-"""Of stands' tops above the table [m]."""
+"""Range of the stands' heights above the table [m]."""
 GAP, LONG_GAP = 0.20, 0.30
-"""Least distance of the glasses' axes [m]: a hand has room between them; and one with an obstacle beside it."""
+"""Least distance of the glasses' axes [m]: for a hand between the glasses; for a hand beside an obstacle."""
 CLOSEST = 0.11
-"""Of the axes of two stands that are not inside each other [m]."""
+"""Least distance of the axes of two stands that do not overlap [m]."""
 NEAREST, FARTHEST = 0.35, 0.72
-"""Of a glass's axis from the arm's base axis [m]: what an arm reaches with a level hand."""
+"""Range of a glass's distance from the arm's base axis [m]: an arm reaches it with a level hand."""
 TABLE_EDGE = 0.35
 """Largest |x| and |y| of a glass's axis on the table [m]."""
 MAX_TRIES = 2000
@@ -26,12 +26,12 @@ MAX_TRIES = 2000
 
 @dataclass(frozen=True, slots=True)
 class PourRanges:
-    """How far a start may differ from the nominal one.
+    """Largest deviations of a start from the nominal one.
 
     Attributes:
-        source: largest shift in x and in y of the source [m].
-        target: largest shift in x and in y of the target [m].
-        height: range of the shift of a stand's height [m].
+        source: largest shift of the source in x and in y [m].
+        target: largest shift of the target in x and in y [m].
+        height: range of the change of a stand's height [m].
         joints: largest change of a start joint [rad].
     """
 
@@ -46,7 +46,7 @@ RANGES = {
     "L1": PourRanges(0.05, 0.10, (0.0, 0.0), 0.05),
     "L2": PourRanges(0.15, 0.20, (-0.05, 0.15), 0.15),
 }
-"""By the name of a layout, see `levels`. A round glass looks the same from everywhere: there is no yaw to draw."""
+"""Ranges by layout name, see `levels`. No yaw is drawn: a round glass has none."""
 
 
 def pour_layout(
@@ -56,17 +56,17 @@ def pour_layout(
     arm_axis: np.ndarray,
     gap: float,
 ) -> np.ndarray:
-    """Tops (2, 3) of the stands [m] by rejection: independent of any method.
+    """Draw the tops (2, 3) of the stands [m] by rejection, independent of any method.
 
     Args:
         rng: source of randomness.
-        ranges: how far they may differ from the nominal ones.
-        nominal: (2, 3) tops [m].
+        ranges: largest deviations from the nominal tops.
+        nominal: (2, 3) nominal tops [m].
         arm_axis: (2,) x, y of the arm's base axis [m].
-        gap: least distance of the glasses [m].
+        gap: least distance of the glasses' axes [m].
 
     Raises:
-        BadOption: none was found in a bounded number of tries.
+        BadOption: no layout was found in `MAX_TRIES` tries.
     """
     reach = np.array([[ranges.source], [ranges.target]])
     for _ in range(MAX_TRIES):
@@ -79,7 +79,13 @@ def pour_layout(
 
 
 def fits(tops: np.ndarray, arm_axis: np.ndarray, gap: float) -> bool:
-    """Stands (2, 3) keep their distances to each other, to the table's edge and to the arm's axis."""
+    """Return whether stands keep their distances to each other, to the table's edge and to the arm's axis.
+
+    Args:
+        tops: (2, 3) tops of the stands [m].
+        arm_axis: (2,) x, y of the arm's base axis [m].
+        gap: least distance of the glasses' axes [m].
+    """
     reach = np.linalg.norm(tops[:, :2] - arm_axis, axis=1)
     return bool(
         (reach >= NEAREST).all()
@@ -90,10 +96,14 @@ def fits(tops: np.ndarray, arm_axis: np.ndarray, gap: float) -> bool:
 
 
 def checked_stands(value: Any, arm_axis: np.ndarray) -> np.ndarray:
-    """Tops (2, 3) of stands that a caller wants.
+    """Return given tops (2, 3) of the stands [m] after checking them.
+
+    Args:
+        value: tops (2, 3) [m], source first.
+        arm_axis: (2,) x, y of the arm's base axis [m].
 
     Raises:
-        BadOption: not numbers of that shape, off the table, inside each other or out of reach.
+        BadOption: the value has another shape, or a stand is off the table, overlaps the other or is out of reach.
     """
     tops = checked_array("stands", value, (2, 3))
     for name, top in zip(("source", "target"), tops, strict=True):

@@ -1,9 +1,9 @@
-"""Where each robot pours: stands, start joints and source, as data.
+"""Places where each robot pours: stands, start joints and source, as data.
 
-The places of the Panda are those of the demonstration. Those of the others were found by the search of
-`tests/place_study.py`: of random places and postures the ones from which most starts of L2 can be poured as
-demonstrated, by inverse kinematics along the whole way, 0.08 rad from all joint limits, no link touching another, the
-trunk, the stands or the target. The source is what the gripper can hold.
+The Panda's places are those of the demonstration. The others were found by the search of `tests/place_study.py`: of
+random places and postures those from which most starts of L2 can be poured as demonstrated, with inverse kinematics
+along the whole path, 0.08 rad to all joint limits, and no link touching another, the trunk, the stands or the target.
+The source fits the gripper.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PourPlaces:
-    """Where a robot pours.
+    """Places where a robot pours.
 
     Attributes:
         stands: nominal x, y, z [m] of the stands' tops, source first.
-        ready: joints at the start [rad]: the hand level, in front of the source.
-        source: the glass to pour from.
+        ready: start joints [rad]: the hand level, in front of the source.
+        source: glass to pour from.
     """
 
     stands: tuple[Place, Place]
@@ -53,4 +53,4 @@ POUR_PLACES: dict[str, PourPlaces | str] = {
         ((-0.077, -0.229, 1.05), (0.113, 0.071, 1.05)), (-1.052, -0.562, 0.811, -0.249, -1.052, 1.571), WIDE
     ),
 }
-"""By robot; in place of what is missing the reason."""
+"""Places by robot, or the reason why a robot has none."""

@@ -1,6 +1,6 @@
-"""The rules of pouring: where the beads are, success, wanted contacts, dense reward, from the simulator's state only.
+"""Rules of pouring: bead counts, success, wanted contacts, dense reward, from the simulator's state only.
 
-The numbers are judged in compiled code, see `state`; `PourProgress` keeps what they came to.
+Compiled code judges the numbers, see `state`; `PourProgress` keeps the results.
 """
 
 from __future__ import annotations
@@ -19,42 +19,55 @@ from ..simulation.state import State
 from .geometry import SOURCE, TARGET
 
 ENOUGH, SPILLED = 0.9, 0.05
-"""Least share of the beads in the target, and largest share outside both glasses, of a success."""
+"""Least share of the beads in the target, and largest share outside both glasses, for success."""
 UPRIGHT = np.deg2rad(10.0)
-"""Largest tilt of a target that stands [rad]."""
+"""Largest tilt at which the target counts as upright [rad]."""
 STILL = 0.01
-"""A glass slower than this stands [m/s]."""
+"""Speed below which a glass counts as at rest [m/s]."""
 LIFTED = 0.02
-"""Height above its start at which the source counts as lifted [m]."""
+"""Height above its start from which the source counts as lifted [m]."""
 ARRIVED = 0.15
-"""Horizontal distance of the source's rim to the target's axis at which the carry ends and the pouring begins [m]."""
+"""Horizontal distance of the source's rim to the target's axis at which the carry ends and the pouring starts [m]."""
 HOME = 0.06
-"""Distance in the plane [m] from where it stood up to which the source may touch its stand."""
+"""Horizontal distance [m] from its initial place within which the source may touch its stand."""
 LYING = TABLE_HEIGHT + 0.03
-"""A bead lower than this cannot come into a glass any more [m]."""
+"""Height (z) below which a bead can no longer get into a glass [m]."""
 LOWEST = TABLE_HEIGHT - 0.05
-"""A glass whose center is below this has fallen off the table [m]."""
+"""Height (z) of a glass's center below which the glass has fallen off the table [m]."""
 TOPPLED = np.deg2rad(45.0)
-"""Tilt from which on a source that was let go has been dropped [rad]."""
-X, Y, Z, WAS_LIFTED, WAS_THERE, TILT, LOST = range(7)
-"""The memory: where the source was at the start; 1 once it was lifted, and once it came to the target; its largest
-tilt [rad] and the most beads outside both glasses on the way between."""
+"""Tilt from which a lifted and released source counts as dropped [rad]."""
+
+
+class MemoryPlaces(NamedTuple):
+    """Places of the numbers that the judge of pouring remembers."""
+
+    x: int = 0  # initial position of the source [m]
+    y: int = 1
+    z: int = 2
+    was_lifted: int = 3  # 1 once the source was lifted
+    was_there: int = 4  # 1 once the source reached the target
+    tilt: int = 5  # largest tilt [rad] of the source in between
+    lost: int = 6  # most beads outside both glasses in between
+    width: int = 7
+
+
+MEMORY = MemoryPlaces()
 
 
 class PourVerdict(NamedTuple):
-    """What the compiled judge says of a state; counts and flags as whole numbers.
+    """Verdict of the compiled judge on a state; counts and flags are whole numbers.
 
     Attributes:
-        source: beads in the source.
-        target: beads in the target.
-        lying: beads that are out for good.
-        held: the source is in the hand.
-        done: enough beads are in the target, and it stands.
-        dropped: the source was lifted, let go and has toppled.
-        fallen: a glass is off the table.
-        unwanted: pairs that touch and should not.
-        low: the smaller owner of the last of them, or -1.
-        high: the other owner.
+        source: number of beads in the source.
+        target: number of beads in the target.
+        lying: number of beads lost for good.
+        held: whether the source is in the hand.
+        done: whether enough beads are in the target, and it is upright and at rest.
+        dropped: whether the source was lifted and released, and has toppled.
+        fallen: whether a glass is off the table.
+        unwanted: number of pairs in unwanted contact.
+        low: smaller owner of the last such pair, or -1.
+        high: larger owner of the last such pair, or -1.
     """
 
     source: int
@@ -71,7 +84,14 @@ class PourVerdict(NamedTuple):
 
 @kernel
 def beads_inside(pose, radius, height, beads):
-    """How many of the beads (n, 3) are within a glass (7,), filled up, of a radius and a height [m]."""
+    """Return the number of beads within a glass, taken as a solid cylinder.
+
+    Args:
+        pose: (7,) pose of the glass, x y z [m] and wxyz.
+        radius: radius of the glass [m].
+        height: height of the glass [m].
+        beads: (n, 3) positions of the beads [m].
+    """
     back, count = (pose[3], -pose[4], -pose[5], -pose[6]), 0
     for k in range(len(beads)):
         away = (beads[k, 0] - pose[0], beads[k, 1] - pose[1], beads[k, 2] - pose[2])
@@ -82,17 +102,22 @@ def beads_inside(pose, radius, height, beads):
 
 @kernel
 def tilt_of(pose):
-    """Angle of the z axis of a pose (7,) to the vertical [rad]."""
+    """Return the angle of a pose's (7,) z axis to the vertical [rad]."""
     return 2.0 * math.atan2(math.hypot(pose[4], pose[5]), math.hypot(pose[3], pose[6]))
 
 
 @kernel
 def allowed_contact(low, high, at_home):
-    """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
+    """Return whether two owners may touch.
 
-    Wanted are the fingers on the source, those of a second arm on the target, the source on its stand as long as it
-    is there, and the target on its own. Beads may touch anything: where they end is judged by itself. A robot's
-    contact with itself says nothing.
+    Wanted contacts are the fingers on the source, a second arm's fingers on the target, the source on its stand while
+    at its initial place, and the target on its stand. Beads may touch anything: their final places are judged
+    separately. A robot's contacts with itself are ignored.
+
+    Args:
+        low: smaller owner, see `WORLD` in `scene`.
+        high: larger owner.
+        at_home: whether the source is at its initial place.
     """
     if low in (high, BEAD) or high == BEAD or (low == ARM and high == FINGERS):
         return True
@@ -109,22 +134,28 @@ def allowed_contact(low, high, at_home):
 
 @kernel
 def rim_gap(pose, height, other):
-    """Horizontal distance [m] of the middle of a glass's rim to another glass's axis."""
+    """Return the horizontal distance [m] from the center of a glass's rim to another glass's axis.
+
+    Args:
+        pose: (7,) pose of the glass, x y z [m] and wxyz.
+        height: height of the glass [m].
+        other: (7,) pose of the other glass.
+    """
     x, y, _ = screw.rotate((pose[3], pose[4], pose[5], pose[6]), (0.0, 0.0, 0.5 * height))
     return math.hypot(pose[0] + x - other[0], pose[1] + y - other[1])
 
 
 @kernel
 def judge_state(poses, velocities, beads, touching, sizes, memory):
-    """Judge a state: the entries of a `PourVerdict`.
+    """Judge a state; return the entries of a `PourVerdict`.
 
     Args:
-        poses: (2, 7) source and target.
-        velocities: (2, 3) of them [m/s].
-        beads: (n, 3) places of the beads [m].
-        touching: (owners, owners) who touches whom, see `State`.
+        poses: (2, 7) poses of source and target, x y z [m] and wxyz.
+        velocities: (2, 3) velocities of source and target [m/s].
+        beads: (n, 3) positions of the beads [m].
+        touching: (owners, owners) contacts, see `State`.
         sizes: (2, 2) radius and height [m] of both glasses.
-        memory: (7,) see X; renewed.
+        memory: (7,) see `WAS_LIFTED`; updated.
     """
     n, source, target = len(beads), poses[SOURCE], poses[TARGET]
     inside = beads_inside(source, sizes[SOURCE, 0], sizes[SOURCE, 1], beads)
@@ -133,19 +164,19 @@ def judge_state(poses, velocities, beads, touching, sizes, memory):
     for k in range(n):
         lying += beads[k, 2] < LYING
     held = touching[FINGERS, FIRST_OBJECT + SOURCE] != 0.0
-    if held and source[2] > memory[Z] + LIFTED:
-        memory[WAS_LIFTED] = 1.0
-    if memory[WAS_LIFTED] != 0.0 and rim_gap(source, sizes[SOURCE, 1], target) < ARRIVED:
-        memory[WAS_THERE] = 1.0
-    if memory[WAS_LIFTED] != 0.0 and memory[WAS_THERE] == 0.0:
-        memory[TILT] = max(memory[TILT], tilt_of(source))
-        memory[LOST] = max(memory[LOST], n - inside - poured)
+    if held and source[2] > memory[MEMORY.z] + LIFTED:
+        memory[MEMORY.was_lifted] = 1.0
+    if memory[MEMORY.was_lifted] != 0.0 and rim_gap(source, sizes[SOURCE, 1], target) < ARRIVED:
+        memory[MEMORY.was_there] = 1.0
+    if memory[MEMORY.was_lifted] != 0.0 and memory[MEMORY.was_there] == 0.0:
+        memory[MEMORY.tilt] = max(memory[MEMORY.tilt], tilt_of(source))
+        memory[MEMORY.lost] = max(memory[MEMORY.lost], n - inside - poured)
     moving = math.sqrt(velocities[TARGET, 0] ** 2 + velocities[TARGET, 1] ** 2 + velocities[TARGET, 2] ** 2)
     stands = tilt_of(target) < UPRIGHT and moving < STILL
     done = stands and poured >= ENOUGH * n and n - inside - poured <= SPILLED * n
-    dropped = memory[WAS_LIFTED] != 0.0 and not held and tilt_of(source) > TOPPLED
+    dropped = memory[MEMORY.was_lifted] != 0.0 and not held and tilt_of(source) > TOPPLED
     fallen = source[2] < LOWEST or target[2] < LOWEST
-    at_home = math.hypot(source[0] - memory[X], source[1] - memory[Y]) < HOME
+    at_home = math.hypot(source[0] - memory[MEMORY.x], source[1] - memory[MEMORY.y]) < HOME
     unwanted, low, high = 0, -1, -1
     for a in range(len(touching)):
         for b in range(a, len(touching)):
@@ -155,50 +186,51 @@ def judge_state(poses, velocities, beads, touching, sizes, memory):
 
 
 class PourProgress(Progress):
-    """What has happened in an episode so far, renewed from the simulator's state at each step.
+    """Progress of pouring, updated from the simulator's state at each step.
 
     Args:
-        start: (2, 7) source and target at the start.
+        start: (2, 7) poses of source and target at the start, x y z [m] and wxyz.
         sizes: (2, 2) radius and height [m] of both glasses.
-        beads: how many there are.
-        dt: seconds between states.
-        in_hand: there is no stand to lift the source from.
+        beads: number of beads.
+        dt: time between states [s].
+        in_hand: whether the source is in the hand from the start, off its stand.
     """
 
     def __init__(self, start: np.ndarray, sizes: np.ndarray, beads: int, dt: float, *, in_hand: bool = False):
         super().__init__(dt)
         self.count, self._sizes = beads, sizes
-        self._memory = np.concatenate([start[SOURCE, :3], [float(in_hand)], np.zeros(3)])
+        self._memory = np.zeros(MEMORY.width)
+        self._memory[MEMORY.x : MEMORY.z + 1], self._memory[MEMORY.was_lifted] = start[SOURCE, :3], float(in_hand)
         self.verdict = PourVerdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
 
     @property
     def failed(self) -> bool:
-        """Nothing that can be done would be a success any more."""
+        """True once a glass has fallen or too many beads are lost."""
         return self.verdict.fallen == 1 or self.verdict.lying > SPILLED * self.count
 
     @property
     def motion_index(self) -> float:
-        """0 while the source is to be fetched, 1 while it is in the hand, 2 once enough beads are in the target."""
+        """Index of the current motion: 0 while fetching the source, 1 while holding it, 2 once enough is poured."""
         return 2.0 if self.verdict.done else float(self.verdict.held)
 
     @property
     def fractions(self) -> np.ndarray:
-        """(3,) share of the beads in the source, in the target, and outside both."""
+        """(3,) shares of the beads in the source, in the target, and outside both."""
         source, target = self.verdict.source, self.verdict.target
         return np.array([source, target, self.count - source - target]) / self.count
 
     @property
     def stage(self) -> str:
-        """The furthest progress in words."""
+        """Furthest progress in words."""
         if self.verdict.target:
             return f"poured {self.verdict.target} of {self.count}"
-        if self._memory[WAS_THERE]:
+        if self._memory[MEMORY.was_there]:
             return "at the target"
-        return "lifted the source" if self._memory[WAS_LIFTED] else "start"
+        return "lifted the source" if self._memory[MEMORY.was_lifted] else "start"
 
     @property
     def failure(self) -> str:
-        """Why it cannot succeed as things are, "" if it can, or did."""
+        """Reason why the task cannot succeed at present, "" if it can or did."""
         if self.success:
             return ""
         if self.verdict.fallen:
@@ -208,14 +240,14 @@ class PourProgress(Progress):
         return "constraint" if self.verdict.lying > SPILLED * self.count else ""
 
     def update(self, state: State) -> PourVerdict:
-        """Take in a new state."""
+        """See `Progress`."""
         poses, moving, beads = state.object_pose, state.object_velocity, state.bead_position
         self.verdict = PourVerdict(*judge_state(poses, moving, beads, state.touching, self._sizes, self._memory))
         self._settle(self.verdict.done == 1, self.verdict)
         return self.verdict
 
     def reward(self, state: State) -> float:
-        """The dense reward in [0, 1] of the state taken in last: reached, held, carried, poured."""
+        """See `Progress`: reached, held, carried, poured."""
         if self.success:
             return 1.0
         source, target = state.object_pose
@@ -226,11 +258,11 @@ class PourProgress(Progress):
         return max(0.1 * reach + 0.1 * self.verdict.held + 0.2 * carry, 0.4 * (poured > 0.0)) + 0.5 * poured
 
     def task_info(self) -> dict[str, Any]:
-        """The task's own entries of `info`."""
+        """See `Progress`."""
         _, target, outside = self.fractions
         return {
             "fraction_in_target": float(target),
             "fraction_outside": float(outside),
-            "carry_tilt": float(self._memory[TILT]),
-            "beads_lost": int(self._memory[LOST]),
+            "carry_tilt": float(self._memory[MEMORY.tilt]),
+            "beads_lost": int(self._memory[MEMORY.lost]),
         }

@@ -1,4 +1,4 @@
-"""Pouring with the source in the hand, before the target."""
+"""Pouring with the source in the hand, in front of the target."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from ...planner import Pose
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import Pose
 from ..core.dense_reward import near, tilting
 from ..core.grasped_start import SQUEEZE, can_follow, holding_joints
 from ..core.reset_options import check_known, checked_joints
-from ..core.single_motion import FREQUENCY, Agreement, SubTask
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
 from ..scene.beads import poured_into
 from ..simulation.simulation import Start
 from ..simulation.state import State
@@ -22,19 +22,19 @@ from .rules import ENOUGH, SPILLED, PourProgress, rim_gap, tilt_of
 
 OPTIONS = ("level", "stands", "joint_positions")
 ASIDE = {"L0": 0.0, "L1": 0.03, "L2": 0.06}
-"""Largest shift [m] of the held glass in x, y and z, by the name of a layout."""
+"""Largest shift [m] of the held glass in x, y and z, by layout name."""
 TURNS = np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0))
-"""By how much the direction of pouring may be turned from the nominal one, the first that can be poured in."""
+"""Turns [rad] of the direction of pouring from the nominal one; the first in which pouring is possible is used."""
 WAY = tuple(np.linspace(0.0, 1.0, 9))
-"""Shares of the pouring tilt at which a posture must be possible from the start."""
+"""Shares of the pouring tilt at which a posture must be reachable from the start."""
 MAX_STARTS = 200
 
 
 class TiltProgress(PourProgress):
-    """Of a source that is in the hand from the start."""
+    """Progress of pouring from a source that is in the hand from the start."""
 
     def reward(self, state: State) -> float:
-        """The dense reward of the state taken in last."""
+        """See `Progress`."""
         if self.success:
             return 1.0
         source, target = state.object_pose
@@ -43,14 +43,14 @@ class TiltProgress(PourProgress):
         return float(tilting(distance, tilt, self.verdict.held, self.verdict.target / self.count))
 
 
-class TiltPourEnv(SubTask[PourProgress], PourEnv):
-    """Empty the glass in the hand into the one before it.
+class TiltPourEnv(SingleMotionEnv[PourProgress], PourEnv):
+    """Empty the glass in the hand into the one in front of it.
 
     ## Description
-    The source glass, which holds 30 beads of 12 mm and 1 g that stand for water, is in the hand, upright, before the
-    target glass and above it, held by friction between the fingers only. It must be tilted so that the beads fall into
-    the target. Success is judged from the simulator as in `onedemo/Pour-v0`: at least 90 % of the beads in the target,
-    at most 5 % outside both glasses, the target upright and at rest, for half a second.
+    The source glass, with 30 beads of 12 mm and 1 g that represent water, is in the hand, upright, in front of and
+    above the target glass, held only by friction between the fingers. It must be tilted so that the beads fall into
+    the target. Success is judged from the simulator as in `onedemo/Pour-v0`: for half a second at least 90 % of the
+    beads are in the target and at most 5 % outside both glasses, and the target is upright and at rest.
 
     ## Action Space
     `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
@@ -60,7 +60,7 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
@@ -69,24 +69,24 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
     |---|---|---|
     | `joint_positions` | (1, 7) | [rad] |
     | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
     | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (2, 7) | source and target; a glass's frame is in the middle of its axis, z up |
-    | `goal_pose` | (1, 7) | the middle of the target's rim at the start; constant during an episode |
-    | `furniture_pose` | (2, 7) | the stands of source and target; constant during an episode |
+    | `object_pose` | (2, 7) | source and target; a glass's frame is at the center of its axis, z up |
+    | `goal_pose` | (1, 7) | center of the target's rim at the start; constant during an episode |
+    | `furniture_pose` | (2, 7) | stands of source and target; constant during an episode |
     | `bead_fraction` | (3,) | share of the beads in the source, in the target, outside both |
-    | `motion_index` | (1,) | 1 while the source is held, 2 while enough is poured, 0 if it was let go |
+    | `motion_index` | (1,) | 1 while the source is held, 2 while enough beads are poured, 0 once it is released |
     | `obstacle_active` | (3,) | 0: there is no obstacle |
     | `obstacle_shape` | (3,) | 0 |
     | `obstacle_size` | (3, 3) | 0 |
     | `obstacle_pose` | (3, 7) | 0 |
     | `obstacle_velocity` | (3, 3) | 0 |
-    | `last_action` | that of the action | what was done last; zeros at the start |
+    | `last_action` | that of the action | last action; zeros at the start |
 
-    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
-    `achieved_goal` and `desired_goal`
-    (2,): the shares of the beads in the target and outside both glasses; 1 and 0.
-    `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
+    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
+    vector), `achieved_goal` and `desired_goal`
+    (2,): shares of the beads in the target and outside both glasses; 1 and 0.
+    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
 
     ## Rewards
     `reward="dense"` (default): in [0, 1], half of it the share of the beads in the target, the other half for holding
@@ -95,14 +95,15 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
     ## Starting State
     By `level`: the target stands as in `onedemo/Pour-v0`, moved by up to 10 cm (L1) or 20 cm and 10 to 30 cm high (L2);
     the source's lip is 6 cm behind the pour point and 8 cm above it, moved by up to 3 cm (L1) or 6 cm (L2) in x, y and
-    z. L0 is the nominal place; R, S and T start as L1 does. The way is too short for obstacles: there is no L3, L4, F.
+    z. L0 is the nominal place; R, S and T start as L1 does. The motion is too short for obstacles: L3, L4 and F do
+    not exist.
 
     ## Episode End
     `terminated` when a glass has fallen off the table, or when more than 5 % of the beads lie on it or below.
     `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
     `control_frequency`). A settled success ends the episode with
     `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form it goes on.
+    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
 
     ## Info
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
@@ -147,7 +148,7 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
         self._take_form("tilt_pour", goal_form, end_on_success, obstacles=False)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        """Stands as in pouring, the source in the hand before the target."""
+        """Return a start with the stands as in pouring, and the source in the hand in front of the target."""
         check_known(options, OPTIONS)
         given = checked_stands(options["stands"], self._axis) if "stands" in options else None
         wanted = checked_joints(options["joint_positions"], self.arms) if "joint_positions" in options else None
@@ -161,7 +162,7 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
         raise BadOption("stands", "the hand cannot be before the target, or not clear of the glasses, at the start")
 
     def _before_target(self, tops: np.ndarray, shift: np.ndarray) -> np.ndarray | None:
-        """Joints (1, dof) that hold the source before the target and can tilt it there; None if none do."""
+        """Return joints (1, dof) that hold the source in front of the target and can tilt it there, or None."""
         arm, glass = self.arms[0], self._glasses[SOURCE]
         rim = tops[TARGET] + [0.0, 0.0, self._glasses[TARGET].height]
         for turn in TURNS:
@@ -182,15 +183,15 @@ class TiltPourEnv(SubTask[PourProgress], PourEnv):
         return Start(joints, glasses, self._furniture.copy(), beads, grips=grips)
 
     def achieved_goal(self, state: State) -> np.ndarray:
-        """(2,) shares of the beads in the target and outside both glasses."""
+        """See `SingleMotionEnv`: (2,) shares of the beads in the target and outside both glasses."""
         return self._progress.fractions[1:].copy()
 
     def desired_goal(self) -> np.ndarray:
-        """(2,) all of them and none."""
+        """See `SingleMotionEnv`: (2,) all beads in the target and none outside."""
         return np.array([1.0, 0.0])
 
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
-        """How many of the beads are where they are to be; nothing is too good."""
+        """See `SingleMotionEnv`: shares of missing and of spilled beads; more than desired costs nothing."""
         missing = np.maximum(desired[..., 0] - achieved[..., 0], 0.0)
         spilled = np.maximum(achieved[..., 1] - desired[..., 1], 0.0)
         reached = (missing <= 1.0 - ENOUGH + 1e-9) & (spilled <= SPILLED + 1e-9)

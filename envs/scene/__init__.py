@@ -1,1 +1,1 @@
-"""What is there: robots, objects and fixtures, compiled once."""
+"""Contents of a scene: robots, objects and fixtures, compiled once."""

@@ -1,4 +1,4 @@
-"""Where an arm and its gripper are in MuJoCo's arrays, and how its gripper opens."""
+"""Addresses of an arm and its gripper in MuJoCo's arrays, and the controls of the open and closed gripper."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...planner.robot.arm import Arm
+from ...planner import Arm
 
 
 @dataclass(frozen=True)
 class ArmIndex:
-    """Where one arm and its gripper are in MuJoCo's arrays.
+    """Addresses of one arm and its gripper in MuJoCo's arrays.
 
     Attributes:
         side: robosuite's name of the arm: "right" or "left".
-        arm: its kinematics.
+        arm: kinematics of the arm.
         qpos: (dof,) addresses of the joint positions.
-        qvel: (dof,) addresses of the joint speeds.
-        ctrl: (dof,) its actuators.
-        act: (dof,) their integrator states.
-        site: the tcp.
+        qvel: (dof,) addresses of the joint velocities.
+        ctrl: (dof,) actuators of the joints.
+        act: (dof,) addresses of the actuators' integrator states.
+        site: site of the tcp.
         pads: geoms of the left and right finger pad.
-        bodies: those that move with the arm, its fingers left out.
+        bodies: bodies that move with the arm, fingers excluded.
         fingers: bodies of the fingers.
         grip: actuators of the fingers.
-        opened: their controls when open.
-        closed: their controls when closed.
-        finger_qpos: addresses of the finger joints.
-        finger_open: their positions when open.
-        finger_inwards: 1 or -1, which way each closes; 0 where it hangs on a linkage.
+        opened: controls of these actuators when open.
+        closed: controls of these actuators when closed.
+        finger_qpos: addresses of the finger joints' positions.
+        finger_open: positions of the finger joints when open.
+        finger_inwards: closing direction of each finger joint, 1 or -1; 0 for joints of a linkage.
     """
 
     side: str
@@ -53,7 +53,15 @@ class ArmIndex:
 
 
 def arm_index(model: mujoco.MjModel, rob: Any, side: str, speeds: tuple[float, ...], name: str) -> ArmIndex:
-    """The index of a robosuite robot's arm in a compiled model that holds it."""
+    """Return the index of a robosuite robot's arm.
+
+    Args:
+        model: compiled model that contains the robot.
+        rob: robosuite's robot.
+        side: robosuite's name of the arm.
+        speeds: (dof,) largest joint speeds [rad/s].
+        name: name of the robot, for messages.
+    """
     gripper = rob.gripper[side]
     count = len(rob.robot_joints) // len(rob.arms)
     first = rob.arms.index(side) * count
@@ -87,7 +95,7 @@ def arm_index(model: mujoco.MjModel, rob: Any, side: str, speeds: tuple[float, .
 
 
 def _moved_by(model: mujoco.MjModel, joints: Any) -> frozenset[int]:
-    """Bodies that some joints move."""
+    """Return the bodies moved by the given joints."""
     moved = {int(model.jnt_bodyid[joint]) for joint in joints}
     for body in range(1, model.nbody):
         if int(model.body_parentid[body]) in moved:
@@ -96,7 +104,7 @@ def _moved_by(model: mujoco.MjModel, joints: Any) -> frozenset[int]:
 
 
 def _gripper_controls(model: mujoco.MjModel, gripper: Any, grip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Controls of the fingers when open and when closed, from the way robosuite drives that gripper."""
+    """Return the fingers' controls when open and when closed, as robosuite drives the gripper."""
     low, high = model.actuator_ctrlrange[grip].T
     ends = []
     for direction in (-1.0, 1.0):
@@ -107,6 +115,6 @@ def _gripper_controls(model: mujoco.MjModel, gripper: Any, grip: np.ndarray) -> 
 
 
 def _fingers_at(model: mujoco.MjModel, grip: np.ndarray, control: np.ndarray, joints: list[int]) -> np.ndarray:
-    """Positions of finger joints under a control, and 0 for those of a linkage, which hang on others."""
+    """Return the positions of finger joints under a control; 0 for the dependent joints of a linkage."""
     driven = {int(model.actuator_trnid[k, 0]): value for k, value in zip(grip, control, strict=True)}
     return np.array([driven.get(joint, 0.0) for joint in joints])

@@ -1,7 +1,7 @@
 """Baxter's trunk cut into slices.
 
-MuJoCo collides with a mesh's convex hull. That of the whole trunk fills the hollow in front of the shoulders, where
-the upper arms move: half of the shoulder's range would be a collision that the real surface is 5 cm away from.
+MuJoCo collides with a mesh's convex hull. The hull of the whole trunk fills the hollow in front of the shoulders, where
+the upper arms move: half of the shoulder's range would be a collision although the real surface is 5 cm away.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import numpy as np
 from ...planner.geometry.shapes import hull_corners
 
 TRUNK = "_base_link_col"
-"""Ending of the name of the trunk's solid geom."""
+"""Suffix of the name of the trunk's collision geom."""
 SLICES = 6
 STL_HEADER = 84
-"""Bytes before the triangles of a binary STL file."""
+"""Number of bytes before the triangles of a binary STL file."""
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def slice_trunk(root: Element) -> None:
-    """Make the trunk's solid geom, where there is one, the hulls of its slices."""
+    """Replace the trunk's collision geom, if there is one, by the convex hulls of its slices."""
     assets = root.find("asset")
     for body in root.iter("body"):
         for geom in body.findall("geom"):
@@ -35,22 +35,22 @@ def slice_trunk(root: Element) -> None:
                     SubElement(assets, "mesh", {"name": f"{name}{k}", "vertex": text})
                     if k:
                         SubElement(body, "geom", {**geom.attrib, "name": f"{name}{k}", "mesh": f"{name}{k}"})
-                # robosuite looks for the geom by its name
+                # robosuite looks the geom up by name
                 geom.set("mesh", f"{name}0")
                 assets.remove(mesh)
 
 
 def triangles(file: Path) -> np.ndarray:
-    """(n, 3, 3) corners of a binary STL file's triangles [m]."""
+    """Return the corners (n, 3, 3) [m] of the triangles in a binary STL file."""
     return np.frombuffer(file.read_bytes()[STL_HEADER:], dtype=TRIANGLE)["corners"].astype(np.float64)
 
 
 def slices(faces: np.ndarray, count: int) -> list[np.ndarray]:
-    """Corners (m, 3) of the hull of what a surface has between equally spaced heights, from below.
+    """Return the hull corners (m, 3) of each horizontal slice of a surface, from the lowest slice up.
 
     Args:
         faces: (n, 3, 3) triangles of a closed surface [m].
-        count: number of slices.
+        count: number of slices of equal height.
     """
     points = faces.reshape(-1, 3)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -64,7 +64,7 @@ def slices(faces: np.ndarray, count: int) -> list[np.ndarray]:
 
 
 def _cut(edges: np.ndarray, height: float) -> np.ndarray:
-    """Points (m, 3) in which edges (n, 2, 3) pass through a height."""
+    """Return the points (m, 3) where edges (n, 2, 3) cross a height."""
     a, b = edges[:, 0], edges[:, 1]
     through = (a[:, 2] - height) * (b[:, 2] - height) < 0.0
     a, b = a[through], b[through]

@@ -1,4 +1,4 @@
-"""The solid geoms of a model that never move, as shapes in the world."""
+"""Collision geoms of a model that never move, as shapes in the world."""
 
 from __future__ import annotations
 
@@ -7,19 +7,23 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import MAX_VERTICES, Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere, hull_corners
+from ...planner import Box, Capsule, Cylinder, Mesh, Obstacle, Pose, Shape, Sphere
+from ...planner.geometry.shapes import MAX_VERTICES, hull_corners
 
 PREFIX = "robot0_"
-"""robosuite's, of whatever belongs to the robot."""
+"""robosuite's name prefix of the parts of the robot."""
 SPECK = 0.005
-"""Balls and boxes smaller than this [m] are left out: some models hold a place with one."""
+"""Spheres and boxes smaller than this [m] are skipped: some models use one as a placeholder."""
 
 
 def static_shapes(model: mujoco.MjModel, geoms: Iterable[int]) -> tuple[Obstacle, ...]:
-    """Those of some geoms that are solid and fixed to the world; planes and specks left out.
+    """Return the collision geoms that are fixed to the world, planes and specks excluded.
 
-    A mesh becomes its convex hull, which is what MuJoCo collides with, its corners thinned to what a shape may have.
+    A mesh becomes its convex hull, which MuJoCo collides with, thinned to the number of corners that a shape may have.
+
+    Args:
+        model: compiled model.
+        geoms: indices of the geoms to consider.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -37,7 +41,7 @@ def static_shapes(model: mujoco.MjModel, geoms: Iterable[int]) -> tuple[Obstacle
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape | None:
-    """The shape of a geom by MuJoCo's half sizes; None for planes and specks."""
+    """Return the shape of a geom from MuJoCo's half sizes; None for planes and specks."""
     known, kind = mujoco.mjtGeom, int(model.geom_type[geom])
     x, y, z = (float(size) for size in model.geom_size[geom])
     if kind == known.mjGEOM_MESH:
@@ -52,7 +56,7 @@ def _shape(model: mujoco.MjModel, geom: int) -> Shape | None:
 
 
 def _corners(model: mujoco.MjModel, mesh: int) -> np.ndarray:
-    """Corners (n, 3) [m] of a mesh's hull; of too many those that stick out farthest in evenly spread directions."""
+    """Return the corners (n, 3) [m] of a mesh's hull; if too many, the farthest in evenly spread directions."""
     first = int(model.mesh_vertadr[mesh])
     points = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
     corners = points[hull_corners(points)]

@@ -1,6 +1,6 @@
-"""Things as elements of MuJoCo's XML. Collision geoms are in group 0, what is seen in group 1.
+"""Scene contents as MJCF elements; collision geoms are in group 0, visual geoms in group 1.
 
-Where robosuite compiles, only group 0 has mass; see `table_model`.
+Compiled by robosuite, only group 0 has mass; see `robosuite_model`.
 """
 
 from __future__ import annotations
@@ -12,19 +12,20 @@ from xml.etree.ElementTree import Element, SubElement
 from .scene_objects import Beads, Book, Color, FreeBody, Furniture, Glass, half_sizes
 
 FRICTION = "1.0 0.005 0.0001"
-"""Sliding, torsional, rolling."""
+"""Friction coefficients: sliding, torsional, rolling."""
 STAVES = 12
-"""Boxes that make the wall of a glass."""
+"""Number of boxes that form the wall of a glass."""
 BEAD_SOLREF = "0.005 1"
-"""Time constant [s] and damping of a bead's contacts: with MuJoCo's 20 ms, falling beads sink through a 3 mm wall."""
+"""Time constant [s] and damping ratio of a bead's contacts: at MuJoCo's 20 ms, falling beads sink through a 3 mm
+wall."""
 OBSTACLE_COLOR: Color = (0.86, 0.24, 0.16, 1.0)
 PAPER: Color = (0.95, 0.92, 0.84, 1.0)
 COVER = 0.0025
-"""Thickness of a book's cover [m], and how far it stands out over the paper."""
+"""Thickness of a book's cover, and its overhang over the paper [m]."""
 TITLE = (0.18, 0.62)
-"""Where a book's title is on its spine: from and to, in parts of its height."""
+"""Range of the title on a book's spine, as fractions of the book's height."""
 PARKED = "0 0 -3"
-"""Where an obstacle is that is not there."""
+"""Position of an inactive obstacle [m]."""
 
 
 def _text(values: Iterable[float]) -> str:
@@ -32,7 +33,7 @@ def _text(values: Iterable[float]) -> str:
 
 
 def _geom(body: Element, kind: str, size: Iterable[float], color: Color, **more: str) -> None:
-    """A solid geom and its visible twin."""
+    """Add a collision geom and its visual twin."""
     shared = {"type": kind, "size": _text(size)}
     place = {key: more.pop(key) for key in ("pos", "quat") if key in more}
     SubElement(body, "geom", {**shared, **place, "group": "0", "rgba": "0 0 0 0", "friction": FRICTION, **more})
@@ -40,7 +41,7 @@ def _geom(body: Element, kind: str, size: Iterable[float], color: Color, **more:
 
 
 def _seen(body: Element, kind: str, size: Iterable[float], color: Color, **place: str) -> None:
-    """A geom that is seen and not felt."""
+    """Add a visual geom without contacts."""
     unfelt = {"group": "1", "contype": "0", "conaffinity": "0", "mass": "0"}
     SubElement(body, "geom", {"type": kind, "size": _text(size), "rgba": _text(color), **place, **unfelt})
 
@@ -52,7 +53,7 @@ def _free(name: str) -> Element:
 
 
 def solid_body(solid: FreeBody) -> Element:
-    """A free body of one shape."""
+    """Return a free body of one shape."""
     body = _free(solid.name)
     kind, size = half_sizes(solid.shape)
     _geom(body, kind, size, solid.color, density=f"{solid.density}", condim=f"{solid.condim}")
@@ -60,7 +61,7 @@ def solid_body(solid: FreeBody) -> Element:
 
 
 def glass_body(glass: Glass) -> Element:
-    """A cup of staves on a disc; the staves start above the disc, so that they never touch what it stands on."""
+    """Return a cup of staves on a disc; the staves start above the disc, so they never touch the cup's support."""
     body = _free(glass.name)
     middle = glass.radius - 0.5 * glass.wall
     width = glass.radius * math.tan(math.pi / STAVES)
@@ -80,7 +81,7 @@ def glass_body(glass: Glass) -> Element:
 
 
 def book_body(book: Book) -> Element:
-    """A box that looks like two boards and a spine around paper, with a band for its title."""
+    """Return a box that looks like two boards and a spine around paper, with a band for its title."""
     body = _free(book.name)
     x, y, z = (0.5 * size for size in book.size)
     solid = {"type": "box", "size": _text((x, y, z)), "group": "0", "rgba": "0 0 0 0", "friction": FRICTION}
@@ -97,9 +98,10 @@ def book_body(book: Book) -> Element:
 
 
 def bead_bodies(beads: Beads) -> list[Element]:
-    """Balls on three sliding joints each, without friction.
+    """Return balls without friction, on three sliding joints each.
 
-    MuJoCo takes the larger friction of a pair unless a geom has priority: without it the beads stick to the glass.
+    MuJoCo uses the larger friction of a contact pair unless one geom has priority: without it the beads stick to the
+    glass.
     """
     bodies = []
     for k in range(beads.count):
@@ -113,7 +115,7 @@ def bead_bodies(beads: Beads) -> list[Element]:
 
 
 def furniture_body(furniture: Furniture) -> Element:
-    """Furniture, moved by MuJoCo's mocap between episodes."""
+    """Return furniture as a mocap body, which is moved between episodes."""
     body = Element("body", {"name": furniture.name, "mocap": "true"})
     for part in furniture.parts:
         kind, size = half_sizes(part.shape)
@@ -122,11 +124,11 @@ def furniture_body(furniture: Furniture) -> Element:
 
 
 def obstacle_bodies(count: int) -> list[Element]:
-    """Bodies whose shape is set at run time; parked until then."""
+    """Return bodies whose shape is set at run time; they are parked until then."""
     bodies = []
     for k in range(count):
         body = Element("body", {"name": f"obstacle{k}", "mocap": "true", "pos": PARKED})
-        # contact is switched on and off at run time, which works only for bodies compiled with it
+        # contacts are switched on and off at run time, which works only for bodies compiled with contacts
         _geom(body, "sphere", (0.01, 0.01, 0.01), OBSTACLE_COLOR)
         bodies.append(body)
     return bodies

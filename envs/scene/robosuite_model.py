@@ -1,8 +1,8 @@
-"""The model of a robot at a table with things, built with robosuite: the only file that touches it.
+"""Model of a robot at a table with objects, built by robosuite; no other module uses robosuite.
 
-robosuite's own controllers cost six times the physics and track a path badly; here every arm joint is MuJoCo's
-integrated-velocity servo: the control is a joint speed, its integral is held by a stiff position servo against
-gravity-free links.
+robosuite's own controllers cost six times the physics and track a path badly. Here every arm joint has MuJoCo's
+integrated-velocity servo: the control is a joint speed, whose integral is held by a stiff position servo; the links are
+gravity-compensated.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from .servos import leave_out_unused, mend_robot, use_velocity_servos
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
 FRICTION = (1.0, 0.005, 0.0001)
-"""Of a wooden block: sliding, torsional, rolling."""
+"""Friction coefficients of a wooden block: sliding, torsional, rolling."""
 
 
 class OneDemoTableScene(ManipulationEnv):
-    """Robot, table and things; used for its model only."""
+    """Robot, table and objects; used for its model only."""
 
     def __init__(self, robot: str, gripper: str, spec: SceneSpec, place: tuple[float | None, float]):
         self.spec, self.place = spec, place
@@ -65,12 +65,12 @@ class OneDemoTableScene(ManipulationEnv):
         leave_out_unused(self.model.root)
 
     def reward(self, action: Any = None) -> float:
-        """Nothing: robosuite asks for one."""
+        """Return 0; robosuite requires a reward."""
         return 0.0
 
 
 def _other_bodies(spec: SceneSpec) -> list[Element]:
-    """Everything that robosuite's own objects cannot be."""
+    """Return the bodies that robosuite's own object classes cannot represent."""
     free = [glass_body(each) for each in spec.objects if isinstance(each, Glass)]
     free += [solid_body(each) for each in spec.objects if isinstance(each, FreeBody) and not each.texture]
     free += [book_body(each) for each in spec.objects if isinstance(each, Book)]
@@ -98,6 +98,13 @@ def _wooden(block: FreeBody) -> BoxObject:
 
 
 def table_env(robot: str, gripper: str, spec: SceneSpec, place: tuple[float | None, float]) -> Any:
-    """A robosuite environment with the compiled model of the scene; `gripper` and `place`: see `Robot`."""
+    """Return a robosuite environment with the compiled model of a scene.
+
+    Args:
+        robot: robosuite's name of the robot.
+        gripper: robosuite's name of its gripper, see `Robot`.
+        spec: scene contents besides robot and table.
+        place: x and y [m] of the robot's base, see `Robot.place`.
+    """
     ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
     return OneDemoTableScene(robot, gripper, spec, place)

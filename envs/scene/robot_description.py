@@ -1,4 +1,4 @@
-"""What every policy may know of the robot: its bodies, and what it must keep clear of for ever."""
+"""Robot facts that every policy may know: its bodies, and the fixtures it must always avoid."""
 
 from __future__ import annotations
 
@@ -6,27 +6,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Capsule, Obstacle, pack
-from ...planner.robot.arm import Arm
-from ...planner.robot.body import RADIUS, Body
+from ...planner import Arm, Body, Capsule, Obstacle, Pose
+from ...planner.geometry.shapes import pack
+from ...planner.robot.body import BODY
 from ...planner.robot.chain_readers import turn_z_to
 from .body_clearance import arm_clearance, capsule_ends
 from .robot_bodies import robot_body
-from .robots import robot_named
 from .scene import CompiledScene
 
 PARKED = "other arm"
-"""Name of an arm that does nothing, among the fixtures."""
+"""Name of an idle arm among the fixtures."""
 
 
 class RobotParts(NamedTuple):
-    """What is known of a robot.
+    """Bodies and fixtures of a robot.
 
     Attributes:
-        bodies: per arm that works its capsules.
-        fixtures: what stands still for ever, an arm that does nothing included.
-        touching: links and fixtures that are so near in every posture that nobody needs to look.
+        bodies: capsules of each working arm.
+        fixtures: solids that never move, including an idle arm.
+        touching: pairs (link, fixture) so close in every posture that they need no check.
     """
 
     bodies: tuple[Body, ...]
@@ -34,9 +32,9 @@ class RobotParts(NamedTuple):
     touching: tuple[tuple[str, str], ...]
 
 
-def robot_parts(robot: str, scene: CompiledScene) -> RobotParts:
-    """What is known of the robot of a scene."""
-    order = list(robot_named(robot).ready)
+def robot_parts(scene: CompiledScene) -> RobotParts:
+    """Return the bodies and fixtures of the robot in a scene."""
+    robot, order = scene.robot, list(scene.robot.ready)
     bodies = tuple(robot_body(robot, order.index(index.side)) for index in scene.arms)
     idle = [
         capsule
@@ -49,9 +47,9 @@ def robot_parts(robot: str, scene: CompiledScene) -> RobotParts:
 
 
 def _capsules(arm: Arm, body: Body, q: np.ndarray) -> list[Obstacle]:
-    """The capsules of an arm at joints q (dof,) as obstacles."""
+    """Return the capsules of an arm at joints q (dof,) as obstacles."""
     found = []
-    for (a, b), radius in zip(capsule_ends(arm, body, q, range(arm.dof)), body.rows[:, RADIUS], strict=True):
+    for (a, b), radius in zip(capsule_ends(arm, body, q, range(arm.dof)), body.rows[:, BODY.radius], strict=True):
         pose = Pose.from_position_quaternion(0.5 * (a + b), turn_z_to(b - a))
         found.append(Obstacle(Capsule(float(radius), float(np.linalg.norm(b - a))), pose, name=PARKED))
     return found
@@ -60,7 +58,7 @@ def _capsules(arm: Arm, body: Body, q: np.ndarray) -> list[Obstacle]:
 def _touching(
     arms: list[Arm], bodies: tuple[Body, ...], home: np.ndarray, fixtures: tuple[Obstacle, ...]
 ) -> tuple[tuple[str, str], ...]:
-    """Links whose capsules reach into a fixture where the arm starts: those next to what they hang on."""
+    """Return pairs (link, fixture) that overlap at the start joints: links next to their mount."""
     return tuple(
         dict.fromkeys(
             (f"link{joint + 1}", fixture.name)

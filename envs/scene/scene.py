@@ -1,4 +1,4 @@
-"""Compiled scenes, and where everything is in MuJoCo's arrays."""
+"""Compiled scenes, with the addresses of their parts in MuJoCo's arrays."""
 
 from __future__ import annotations
 
@@ -7,22 +7,20 @@ import logging
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from ...planner.geometry.shapes import Obstacle
-from ...planner.robot.arm import Arm
+from ...planner import Arm, Obstacle
 from .arm_index import ArmIndex, arm_index
 from .fixed_shapes import static_shapes
-from .robots import robot_named
+from .robots import Robot
 from .scene_objects import NOTHING, SceneSpec
 
 WORLD, ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, OBSTACLE, FURNITURE, BEAD, FIRST_OBJECT = range(9)
-"""Who a geom belongs to: what is fixed to the world, the first arm, its fingers, the second arm, its fingers, an
-obstacle, furniture, a bead, or object k as FIRST_OBJECT + k."""
+"""Owners of geoms: the fixed world, the first arm, its fingers, the second arm, its fingers, an obstacle, furniture,
+a bead, or object k as FIRST_OBJECT + k."""
 
 
 @dataclass(frozen=True)
@@ -30,21 +28,23 @@ class CompiledScene:
     """A compiled scene; `model` is shared: copy it before changing it.
 
     Attributes:
+        robot: the robot.
         model: MuJoCo's model.
-        arms: the arms that work.
-        home: (n_arms, dof) the joints from which they start.
-        parked: the arms that do nothing.
-        parked_joints: (n_parked, dof) where they are held.
+        arms: working arms.
+        home: (n_arms, dof) start joints [rad] of the working arms.
+        parked: idle arms.
+        parked_joints: (n_parked, dof) joints [rad] at which the idle arms are held.
         objects: body ids of the free objects.
         furniture: mocap ids of the furniture.
-        obstacles: (n, 3) body, solid geom and visible geom of each obstacle.
-        beads: (n, 3) addresses of the beads' places in `qpos`.
-        owner: (ngeom,) whose geom it is, see WORLD.
-        labels: (ngeom,) names for messages.
-        fixtures: what stands still for ever and is solid: a one-armed robot's own base and the floor left out, a
-            two-armed robot's trunk included.
+        obstacles: (n, 3) body, collision geom and visual geom of each obstacle.
+        beads: (n, 3) addresses of the beads' positions in `qpos`.
+        owner: (ngeom,) owner of each geom, see `WORLD`.
+        labels: (ngeom,) names of the geoms, for messages.
+        fixtures: solids that never move; a one-armed robot's own base and the floor are excluded, a two-armed robot's
+            trunk is included.
     """
 
+    robot: Robot
     model: mujoco.MjModel
     arms: tuple[ArmIndex, ...]
     home: np.ndarray
@@ -60,23 +60,21 @@ class CompiledScene:
 
 
 @lru_cache(maxsize=16)
-def compiled_scene(robot: str, spec: SceneSpec = NOTHING, arms: tuple[str, ...] | None = None) -> CompiledScene:
-    """The scene of a robot at a table with things; compiled once per process.
+def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...] | None = None) -> CompiledScene:
+    """Return the scene of a robot at a table with objects; compiled once per process.
 
     Args:
-        robot: one of `ROBOTS`.
-        spec: what there is besides.
-        arms: names of the arms that work, in the order of observations; None: the robot's first.
+        robot: of `ROBOTS`.
+        spec: scene contents besides robot and table.
+        arms: names of the working arms, in the order of observations; None: the robot's first.
 
     Raises:
-        UnknownName: no such robot.
-        BadOption: it has no such arm.
+        BadOption: the robot has no such arm.
     """
-    kind = robot_named(robot)
-    working = kind.checked_arms(arms, robot)
-    env = _model_library().table_env(robot, kind.gripper, spec, kind.place(working))
+    working = robot.checked_arms(arms)
+    env = _model_library().table_env(robot.name, robot.gripper, spec, robot.place(working))
     model, rob = copy.copy(env.sim.model._model), env.robots[0]
-    indices = {side: arm_index(model, rob, side, kind.speeds, robot) for side in rob.arms}
+    indices = {side: arm_index(model, rob, side, robot.speeds, robot.name) for side in rob.arms}
     idle = tuple(side for side in rob.arms if side not in working)
     objects = np.array([_body_of(model, each.name) for each in spec.objects], dtype=np.int64)
     furniture = np.array([model.body(each.name).id for each in spec.furniture], dtype=np.int64)
@@ -88,13 +86,14 @@ def compiled_scene(robot: str, spec: SceneSpec = NOTHING, arms: tuple[str, ...] 
     known = {**{int(body): FIRST_OBJECT + k for k, body in enumerate(objects)}, **dict.fromkeys(beads, BEAD)}
     known |= {**{int(body): FURNITURE for body in furniture}, **dict.fromkeys(bodies, OBSTACLE)}
     owner, labels = _owners(model, [indices[side] for side in (*working, *idle)], known)
-    dof = len(kind.speeds)
+    dof = len(robot.speeds)
     return CompiledScene(
+        robot=robot,
         model=model,
         arms=tuple(indices[side] for side in working),
-        home=np.array([kind.ready[side] for side in working]),
+        home=np.array([robot.ready[side] for side in working]),
         parked=tuple(indices[side] for side in idle),
-        parked_joints=np.array([kind.parked[side] for side in idle]).reshape(-1, dof),
+        parked_joints=np.array([robot.parked[side] for side in idle]).reshape(-1, dof),
         objects=objects,
         furniture=model.body_mocapid[furniture].astype(np.int64),
         obstacles=obstacles,
@@ -105,23 +104,30 @@ def compiled_scene(robot: str, spec: SceneSpec = NOTHING, arms: tuple[str, ...] 
     )
 
 
-def robot_arm(robot: str, index: int = 0) -> Arm:
-    """The kinematics of a robot's arm as it stands at the table, tcp between the finger pads."""
+def robot_arm(robot: Robot, index: int = 0) -> Arm:
+    """Return the kinematics of a robot's arm at the table, tcp between the finger pads.
+
+    Args:
+        robot: of `ROBOTS`.
+        index: index among the arms that work by default.
+    """
     return compiled_scene(robot).arms[index].arm
 
 
 def _model_library() -> Any:
-    """The module that builds models, imported late: robosuite takes seconds and warns of optional things."""
+    """Return the module that builds models, imported late: robosuite takes seconds and warns of optional packages."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:
-        return import_module(".table_model", __package__)
+        from . import robosuite_model
+
+        return robosuite_model
     finally:
         logging.disable(before)
 
 
 def _body_of(model: mujoco.MjModel, name: str) -> int:
-    """Id of the body of an object; robosuite's own objects add a word to its name."""
+    """Return the body id of an object; robosuite's own objects have a suffix in their name."""
     found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     return found if found >= 0 else model.body(f"{name}_main").id
 
@@ -133,12 +139,12 @@ def _geoms(model: mujoco.MjModel, body: int) -> range:
 def _owners(
     model: mujoco.MjModel, arms: Iterable[ArmIndex], known: dict[int, int]
 ) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Of every geom its owner and its name for messages.
+    """Return the owner of every geom, and its name for messages.
 
     Args:
-        model: the compiled model.
-        arms: those that work, then those that do not.
-        known: the owners of bodies that are things.
+        model: compiled model.
+        arms: working arms, then idle ones.
+        known: owners by body id, for bodies other than the robot's and the world's.
     """
     indices = list(arms)
     parts = {body: ARM + 2 * k for k, index in enumerate(indices) for body in index.bodies}

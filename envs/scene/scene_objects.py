@@ -1,4 +1,4 @@
-"""What scenes are made of besides the robot: descriptions, no simulator."""
+"""Scene contents besides the robot: descriptions, independent of the simulator."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from ...planner import Box, Capsule, Cylinder, Pose, Shape, Sphere
 
 TABLE_HEIGHT = 0.8
-"""z of the table top [m]."""
+"""Height (z) of the table top [m]."""
 TABLE_HALF_SIZE = 0.4
-"""Of the table top, in x and y [m]."""
+"""Half size of the table top in x and y [m]."""
 Color = tuple[float, float, float, float]
-"""Red, green, blue and opacity, from 0 to 1."""
+"""Red, green, blue and opacity, in [0, 1]."""
 GLASS: Color = (0.72, 0.86, 0.95, 0.32)
 MATT: Color = (0.62, 0.60, 0.57, 1.0)
 
@@ -24,13 +23,13 @@ class FreeBody:
     """A free body of one shape.
 
     Attributes:
-        name: unique.
-        shape: a box, sphere, capsule or cylinder, centered on the body's frame.
-        texture: robosuite's name of one; "" for none. Boxes only.
-        color: used where there is no texture.
-        density: [kg/m3].
+        name: unique name.
+        shape: box, sphere, capsule or cylinder, centered on the body's frame.
+        texture: robosuite's name of a texture, for boxes only; "" for none.
+        color: color used without a texture.
+        density: density [kg/m3].
         condim: MuJoCo's number of contact dimensions: 4 resists twisting in the grasp.
-        yaw_symmetry: smallest yaw [rad] after which it looks the same; 2 pi if it never does, 0 if it always does.
+        yaw_symmetry: smallest yaw [rad] after which the body looks the same; 2 pi without symmetry, 0 for a round body.
     """
 
     name: str
@@ -44,15 +43,15 @@ class FreeBody:
 
 @dataclass(frozen=True)
 class Glass:
-    """A free, straight-walled, round cup; its frame is in the middle of its axis, z up.
+    """A free, straight-walled, round cup; its frame is at the center of its axis, z up.
 
     Attributes:
-        name: unique.
-        radius: outside [m].
-        height: outside [m].
-        wall: thickness [m] of the wall and the bottom.
-        mass: [kg].
-        color: of the glass.
+        name: unique name.
+        radius: outer radius [m].
+        height: outer height [m].
+        wall: thickness of wall and bottom [m].
+        mass: mass [kg].
+        color: color of the glass.
     """
 
     name: str
@@ -65,21 +64,21 @@ class Glass:
 
     @property
     def shape(self) -> Cylinder:
-        """The cup, filled up."""
+        """The cup as a solid cylinder."""
         return Cylinder(self.radius, self.height)
 
 
 @dataclass(frozen=True)
 class Book:
-    """A free, closed book: to the physics one box, to the eye a cover around paper.
+    """A free, closed book: one box to the physics, a cover around paper in images.
 
-    Its frame is in its middle: x from the spine to the edge that opens, y across its thickness, z along the spine.
+    Its frame is at its center: x from the spine to the opening edge, y across its thickness, z along the spine.
 
     Attributes:
-        name: unique.
+        name: unique name.
         size: depth, thickness, height [m].
-        color: of the cover.
-        density: [kg/m3].
+        color: color of the cover.
+        density: density [kg/m3].
     """
 
     name: str
@@ -90,19 +89,19 @@ class Book:
 
     @property
     def shape(self) -> Box:
-        """It."""
+        """The book's box."""
         return Box(self.size)
 
 
 @dataclass(frozen=True)
 class Beads:
-    """Small balls that stand for a liquid; each slides without turning, which is what makes them cheap.
+    """Small balls that represent a liquid; each slides without turning, which makes them cheap.
 
     Attributes:
-        count: how many.
-        radius: [m].
-        mass: of one [kg].
-        color: of all.
+        count: number of beads.
+        radius: radius of a bead [m].
+        mass: mass of a bead [kg].
+        color: color of all beads.
     """
 
     count: int = 30
@@ -113,12 +112,12 @@ class Beads:
 
 @dataclass(frozen=True)
 class FixedShape:
-    """A piece of furniture.
+    """A solid part of furniture.
 
     Attributes:
-        shape: a box, sphere, capsule or cylinder.
-        place: (7,) its center in the furniture's frame, x y z [m] and wxyz.
-        color: of it.
+        shape: box, sphere, capsule or cylinder.
+        place: (7,) pose of the shape's center in the furniture's frame, x y z [m] and wxyz.
+        color: color of the part.
     """
 
     shape: Shape
@@ -127,17 +126,17 @@ class FixedShape:
 
     @property
     def pose(self) -> Pose:
-        """In the furniture's frame."""
+        """Pose in the furniture's frame."""
         return Pose.from_vector(self.place)
 
 
 @dataclass(frozen=True)
 class Furniture:
-    """Does not move within an episode, but may stand elsewhere in the next.
+    """Furniture: fixed within an episode, possibly moved between episodes.
 
     Attributes:
-        name: unique.
-        parts: its pieces.
+        name: unique name.
+        parts: solid parts.
     """
 
     name: str
@@ -146,13 +145,13 @@ class Furniture:
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """Everything in a scene besides robot and table.
+    """Scene contents besides robot and table.
 
     Attributes:
         objects: free bodies, in the order of `object_pose`.
-        furniture: in the order of `furniture_pose`.
-        beads: None, or the liquid.
-        obstacles: how many bodies of any shape may be in the way at once.
+        furniture: furniture, in the order of `furniture_pose`.
+        beads: the liquid, or None.
+        obstacles: largest number of obstacles, of any shape, at once.
     """
 
     objects: tuple[FreeBody | Glass | Book, ...] = ()
@@ -165,10 +164,10 @@ NOTHING = SceneSpec()
 
 
 def half_sizes(shape: Shape) -> tuple[str, tuple[float, float, float]]:
-    """MuJoCo's name and sizes of a shape.
+    """Return MuJoCo's name and half sizes [m] of a shape.
 
     Raises:
-        TypeError: it is a mesh.
+        TypeError: the shape is a mesh.
     """
     if isinstance(shape, Box):
         x, y, z = shape.size
@@ -181,7 +180,7 @@ def half_sizes(shape: Shape) -> tuple[str, tuple[float, float, float]]:
 
 
 def extents(shape: Shape) -> np.ndarray:
-    """Full extents (3,) [m] along the shape's own axes."""
+    """Return the full extents (3,) [m] along the shape's own axes."""
     kind, half = half_sizes(shape)
     if kind == "box":
         return 2.0 * np.array(half)

@@ -1,29 +1,29 @@
-"""Changes to robosuite's model before it is compiled: servos instead of its controllers, nothing unused."""
+"""Changes to robosuite's model before compilation: servos instead of its controllers, unused parts removed."""
 
 from __future__ import annotations
 
 from xml.etree.ElementTree import Element, SubElement
 
 STIFFNESS, DAMPING = 40.0, 0.04
-"""Servo stiffness per torque limit [1/rad], and damping per stiffness [s]: the lag of the servo."""
+"""Servo stiffness per torque limit [1/rad], and damping per stiffness [s], which is the servo's lag."""
 LEAST_INERTIA = 0.0064
-"""Rotor inertia per torque limit [s2] that a joint has at least: with less, the servo's damping, which counts for a
-whole step of the physics, throws it back and forth at every step."""
+"""Least rotor inertia of a joint per torque limit [s2]: with less, the servo's damping torque, which is constant
+within a physics step, makes the joint oscillate from step to step."""
 MAX_COMMAND = 5.0
-"""Largest commanded joint speed [rad/s]; what an action can ask for is bound by the robot's own limits."""
+"""Largest commanded joint speed [rad/s]; actions are bounded by the robot's own limits."""
 ENDLESS = 6.28318
-"""Limit [rad] given to joints that have none: observations are bounded."""
+"""Limit [rad] of joints that have none: observations are bounded."""
 ALWAYS_TOUCH = (
     ("_link0", "_link1"),
     ("_arm_base_link", "_l0"),
     ("_inner_finger", "_inner_knuckle"),
     ("_outer_knuckle", "_inner_knuckle"),
 )
-"""Endings of the names of neighboring links that touch in every posture."""
+"""Name suffixes of neighboring links that touch in every posture."""
 
 
 def mend_robot(root: Element) -> None:
-    """Give endless joints limits, and a pedestal its own shape: its mesh would be collided with as a ball."""
+    """Give endless joints limits, and a pedestal its mesh as collision shape, which would otherwise be a ball."""
     for joint in root.iter("joint"):
         if (joint.get("name") or "").startswith("robot") and joint.get("range") is None:
             joint.set("limited", "true")
@@ -34,7 +34,12 @@ def mend_robot(root: Element) -> None:
 
 
 def use_velocity_servos(root: Element, joints: set[str]) -> None:
-    """Replace the torque motors of the arms, keeping their names, and free the robot of gravity."""
+    """Replace the arms' torque motors by velocity servos of the same names, and compensate the robot's gravity.
+
+    Args:
+        root: root element of the model, changed in place.
+        joints: names of the arms' joints.
+    """
     by_name = {joint.get("name"): joint for joint in root.iter("joint")}
     actuators = root.find("actuator")
     assert actuators is not None
@@ -67,14 +72,14 @@ def use_velocity_servos(root: Element, joints: set[str]) -> None:
 
 
 def leave_out_unused(root: Element) -> None:
-    """Remove what costs time at every step and says nothing: force sensors, links touching their neighbors."""
+    """Remove parts that cost time at every step without use: force sensors, contacts of links with their neighbors."""
     for sensor in root.findall("sensor"):
         root.remove(sensor)
     names = [body.get("name") or "" for body in root.iter("body")]
     contact = root.find("contact")
     if contact is None:
         contact = SubElement(root, "contact")
-    # MuJoCo leaves out contacts of a link with its parent, but not where the parent is fixed to the world
+    # MuJoCo skips contacts of a link with its parent, except where the parent is fixed to the world
     for first, second in ALWAYS_TOUCH:
         for name in names:
             other = name.removesuffix(first) + second

@@ -1,1 +1,1 @@
-"""Shelving books, and its single motion."""
+"""Shelving books, and inserting a single one."""

@@ -1,4 +1,4 @@
-"""Places that a caller gives to shelving's `reset(options=...)`, checked."""
+"""Checks of the places given to shelving's `reset(options=...)`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...planner import Pose
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import Pose
 from ..core.reset_options import checked_array, checked_poses
 from ..scene.scene_objects import TABLE_HEIGHT
 from .layout import ShelfLayout
@@ -17,23 +17,29 @@ from .places import ShelfPlaces
 
 OPTIONS = ("level", "obstacles", "stand_pose", "cupboard_pose", "slots", "books", "clutter", "joint_positions")
 STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN = 0.12, 0.15, 0.10, np.deg2rad(45.0)
-"""How far a given stand may be from the nominal one [m, rad]."""
+"""Largest deviations of a given stand from the nominal one: aside, down, up [m], yaw [rad]."""
 CUPBOARD_WAY, CUPBOARD_TURN = 0.05, np.deg2rad(20.0)
-"""How far a given cupboard may be from the nominal one [m, rad]: it stands on the table, within reach."""
+"""Largest deviations of a given cupboard from the nominal one [m, rad]: it stands on the table, within reach."""
 LOWEST_STAND = 1.0
-"""z [m] of the stand's top below which its tube would come through the plate."""
+"""Height (z) [m] of the stand's top below which its tube would pierce the plate."""
 BOOK_WAY = np.array([0.015, 0.03, np.deg2rad(20.0)])
-"""How far a given book may lie from the middle of the stand, x, y [m] and yaw [rad]: it lies safely, fingers fit in."""
+"""Largest deviations of a given book from the middle of the stand, x, y [m] and yaw [rad]: it lies safely, and
+fingers fit."""
 BESIDE = 0.03
-"""Least room [m] for a finger beside a book that is let go."""
+"""Least clearance [m] for a finger beside a released book."""
 
 
 def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlaces) -> ShelfLayout:
-    """The layout drawn, changed by what is given.
+    """Return the drawn layout with the given places.
+
+    Args:
+        drawn: layout drawn at random.
+        options: options of `reset`.
+        places: nominal places of the robot.
 
     Raises:
-        BadOption: a stand or a cupboard that is out of reach, off the table or tilted; books that do not lie on the
-            stand; slots or clutter that are inside each other or the cupboard.
+        BadOption: stand or cupboard out of reach, off the table or tilted; books off the stand; slots or clutter that
+            overlap each other or the cupboard.
     """
     changes: dict[str, Any] = {}
     if "stand_pose" in options:
@@ -58,7 +64,7 @@ def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlace
 
 
 def _standing(option: str, value: Any, nominal: tuple[Any, float], bounds: tuple[float, float, float, float]) -> Pose:
-    """Check an upright pose: at most `bounds` (aside, down, up, yaw) from the nominal place (x, y, z) and yaw."""
+    """Return an upright pose, within `bounds` (aside, down, up, yaw) of the nominal place (x, y, z) and yaw."""
     pose = Pose.from_vector(checked_poses(option, [value], 1)[0])
     (x, y, z), yaw = nominal
     aside, lower, higher, turn = bounds
@@ -75,7 +81,7 @@ def _standing(option: str, value: Any, nominal: tuple[Any, float], bounds: tuple
 
 
 def _lying(value: Any, count: int) -> np.ndarray:
-    """Places (count, 3) on the stand."""
+    """Return given places (count, 3) of books on the stand."""
     books = checked_array("books", value, (count, 3))
     for k, off in enumerate(np.abs(books)):
         if (off > BOOK_WAY).any():
@@ -88,7 +94,7 @@ def _lying(value: Any, count: int) -> np.ndarray:
 
 
 def _check_room(layout: ShelfLayout) -> None:
-    """Clutter and slots are in the cupboard and beside each other."""
+    """Check that clutter and slots are inside the cupboard and beside each other."""
     if (layout.clutter < 0.0).any():
         raise BadOption("clutter", f"gap {layout.clutter.min():.4g} m is negative: inside the wall or before the front")
     reach = 0.5 * (PITCH * (len(layout.books) - 1) + BOOK_SIZE[1])

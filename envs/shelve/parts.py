@@ -1,36 +1,35 @@
-"""The cupboard, its books and the stand they are handed over on: sizes, colors and places, no simulator."""
+"""Cupboard, books and handover stand: sizes, colors and places, independent of the simulator."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Cylinder
+from ...planner import Box, Cylinder, Pose
 from ..scene.scene_objects import TABLE_HEIGHT, Book, Color, FixedShape, Furniture
 
 BOOK_SIZE = (0.16, 0.035, 0.22)
-"""Of the books to shelve: depth, thickness, height [m]; 0.3 kg."""
+"""Depth, thickness, height [m] of the books to shelve; 0.3 kg each."""
 COLORS: tuple[Color, ...] = ((0.70, 0.16, 0.15, 1.0), (0.13, 0.30, 0.56, 1.0), (0.16, 0.45, 0.26, 1.0))
 SHELVES = {"lower": 0.15, "upper": 0.42}
 """Heights of the shelf boards above the table [m]."""
 DEPTH, WIDTH, CLEAR = 0.24, 0.52, 0.26
-"""Inside of a shelf [m]; `CLEAR` is its height."""
+"""Inner depth, width and height of a shelf [m]."""
 PITCH = 0.07
-"""From slot to slot [m]: what leaves room for the fingers beside the neighbor."""
+"""Distance between slots [m], with clearance for the fingers beside the neighbor."""
 INSET = 0.01
-"""Of a shelved book's spine behind the front edge [m]."""
+"""Distance of a shelved book's spine behind the front edge [m]."""
 PLATE = (0.11, 0.10, 0.012)
-"""Of the stand: along the way in which a book is taken, across, thickness [m]."""
+"""Size of the stand's plate [m]: along the direction in which a book is taken, across, thickness."""
 OVERHANG = 0.05
-"""Of a book's spine over the stand [m]: room for the fingers."""
+"""Overhang of a book's spine over the stand [m], with clearance for the fingers."""
 TURNED = (0.5**0.5, 0.5**0.5, 0.0, 0.0)
-"""A book that lies (wxyz): its x stays, its back cover is up."""
+"""Rotation (wxyz) of a lying book: its x is unchanged, its back cover is up."""
 PILE_YAW = 1.0
 WOOD: Color = (0.76, 0.58, 0.39, 1.0)
 DARK_WOOD: Color = (0.58, 0.41, 0.26, 1.0)
 STEEL: Color = (0.46, 0.48, 0.51, 1.0)
 BOARD, SIDE, BACK = 0.010, 0.012, 0.006
-"""Thicknesses [m]."""
+"""Thicknesses of shelf boards, side walls and back wall [m]."""
 CLUTTER = (
     ("upper", "left", (0.17, 0.042, 0.230), (0.85, 0.62, 0.20, 1.0)),
     ("upper", "left", (0.15, 0.030, 0.200), (0.42, 0.27, 0.47, 1.0)),
@@ -38,11 +37,11 @@ CLUTTER = (
     ("lower", "left", (0.18, 0.050, 0.240), (0.36, 0.24, 0.18, 1.0)),
     ("lower", "right", (0.14, 0.032, 0.190), (0.78, 0.37, 0.20, 1.0)),
 )
-"""Books that stand there already: shelf, side, size [m] and color, from the side's wall inwards."""
+"""Books already in the cupboard: shelf, side, size [m] and color, from the side wall inwards."""
 
 
 def books(count: int) -> tuple[Book, ...]:
-    """Those to shelve, then the clutter."""
+    """Return the books to shelve, then the clutter."""
     wanted = [Book(f"book{k}", BOOK_SIZE, color) for k, color in enumerate(COLORS[:count])]
     return (*wanted, *(Book(f"clutter{k}", size, color) for k, (*_, size, color) in enumerate(CLUTTER)))
 
@@ -52,7 +51,7 @@ def _board(size: tuple[float, float, float], place: tuple[float, float, float], 
 
 
 def cupboard() -> Furniture:
-    """Two shelves on a plinth. Its frame is at the middle of its front, at table height, x pointing in."""
+    """Return two shelves on a plinth; the frame is at the middle of the front, at table height, x pointing in."""
     middle, wide, foot = 0.5 * DEPTH, WIDTH + 2.0 * SIDE, SHELVES["lower"] - 0.015
     roof = SHELVES["upper"] + CLEAR
     tall, center = roof + BOARD - foot, 0.5 * (roof + BOARD + foot)
@@ -71,7 +70,11 @@ def cupboard() -> Furniture:
 
 
 def stand() -> tuple[Furniture, Furniture]:
-    """A plate on a rod, its frame in the middle of the plate's top, x along the way in; and the tube it slides in."""
+    """Return the stand and its foot.
+
+    The stand is a plate on a rod, its frame at the center of the plate's top, x along the direction in which a book is
+    taken; the foot has the tube in which the rod slides.
+    """
     rod = FixedShape(Cylinder(0.016, 0.238), (0.0, 0.0, -0.131, 1.0, 0.0, 0.0, 0.0), STEEL)
     tube = FixedShape(Cylinder(0.021, 0.18), (0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0), STEEL)
     foot = FixedShape(Cylinder(0.055, 0.012), (0.0, 0.0, 0.006, 1.0, 0.0, 0.0, 0.0), STEEL)
@@ -80,27 +83,37 @@ def stand() -> tuple[Furniture, Furniture]:
 
 
 def slot(shelf: str, along: float) -> Pose:
-    """Where a book ends, in the cupboard's frame, `along` [m] to the left of the middle."""
+    """Return a slot in the cupboard's frame, as the pose of a shelved book.
+
+    Args:
+        shelf: "lower" or "upper".
+        along: distance to the left of the middle [m].
+    """
     height = SHELVES[shelf] + 0.5 * BOOK_SIZE[2]
     return Pose.from_position_quaternion([INSET + 0.5 * BOOK_SIZE[0], along, height])
 
 
 def handed(offset: np.ndarray) -> Pose:
-    """A book that lies on the stand, in the stand's frame, `offset` (3,): x, y [m] and yaw [rad] from the middle."""
+    """Return a lying book's pose in the stand's frame, for an offset (3,) x, y [m] and yaw [rad] from the middle."""
     middle = 0.5 * (BOOK_SIZE[0] - PLATE[0]) - OVERHANG
     turned = Pose.from_yaw([middle + offset[0], offset[1], 0.5 * BOOK_SIZE[1]], offset[2])
     return turned @ Pose.from_position_quaternion([0, 0, 0], TURNED)
 
 
 def waiting(pile: tuple[float, float], order: int) -> Pose:
-    """A book in the pile at a place (x, y) on the table [m], `order` from the bottom, in the world."""
+    """Return the world pose of a book in the pile.
+
+    Args:
+        pile: x, y of the pile on the table [m].
+        order: index of the book, from the bottom.
+    """
     height = TABLE_HEIGHT + (order + 0.5) * BOOK_SIZE[1]
     lying = Pose.from_position_quaternion([0, 0, 0], TURNED)
     return Pose.from_yaw([*pile, height], PILE_YAW + 0.12 * order) @ lying
 
 
 def clutter_poses(gaps: np.ndarray) -> list[Pose]:
-    """Where the clutter stands in the cupboard's frame; `gaps` (n, 2) from its neighbor and from the front [m]."""
+    """Return the clutter's poses in the cupboard's frame, for gaps (n, 2) [m] to neighbor or wall and to the front."""
     taken: dict[tuple[str, str], float] = {}
     found = []
     for (shelf, side, size, _), (beside, behind) in zip(CLUTTER, gaps, strict=True):

@@ -1,9 +1,9 @@
-"""Where each robot shelves: stand, cupboard and start joints, as data.
+"""Places where each robot shelves: stand, cupboard and start joints, as data.
 
-The places of the Panda are those of the demonstration. Those of the others were found by the search of
-`tests/place_study.py`: of random places and postures the ones from which most starts of L2 can be shelved as
-demonstrated, by inverse kinematics along the whole way of all three books, 0.08 rad from all joint limits, no link
-touching another, the trunk, the table, the pile, the stand or the cupboard.
+The Panda's places are those of the demonstration. The others were found by the search of `tests/place_study.py`: of
+random places and postures those from which most starts of L2 can be shelved as demonstrated, with inverse kinematics
+along the whole path of all three books, 0.08 rad to all joint limits, and no link touching another, the trunk, the
+table, the pile, the stand or the cupboard.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ..scene.robots import Joints
 
 @dataclass(frozen=True)
 class ShelfPlaces:
-    """Where a robot shelves.
+    """Places where a robot shelves.
 
     Attributes:
-        stand: nominal middle of the stand's top [m].
-        stand_yaw: nominal way in which a book is taken [rad].
-        cupboard: nominal middle of the cupboard's front [m].
-        cupboard_yaw: nominal way in which a book is inserted [rad].
-        ready: joints at the start [rad]: the hand level before the stand, fingers above each other.
-        pile: x, y of the books that wait on the table [m]: out of the arm's way.
+        stand: nominal center of the stand's top [m].
+        stand_yaw: nominal direction in which a book is taken [rad].
+        cupboard: nominal x, y of the middle of the cupboard's front [m].
+        cupboard_yaw: nominal direction in which a book is inserted [rad].
+        ready: start joints [rad]: the hand level in front of the stand, fingers above each other.
+        pile: x, y of the waiting books on the table [m], clear of the arm.
     """
 
     stand: tuple[float, float, float]
@@ -75,4 +75,4 @@ SHELF_PLACES: dict[str, ShelfPlaces | str] = {
     ),
     "Kinova3": "its wrist, of 13 Nm, follows too softly to keep a book clear of its neighbors",
 }
-"""By robot; in place of what is missing the reason. Straight ahead, a Panda cannot insert anything by 20 cm."""
+"""Places by robot, or the reason why a robot has none. Straight ahead, a Panda cannot insert anything by 20 cm."""

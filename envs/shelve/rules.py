@@ -1,6 +1,6 @@
-"""The rules of shelving: progress, success, wanted contacts, dense reward, from the simulator's state only.
+"""Rules of shelving: progress, success, wanted contacts, dense reward, from the simulator's state only.
 
-The numbers are judged in compiled code, see `state`; `ShelveProgress` keeps what they came to.
+Compiled code judges the numbers, see `state`; `ShelveProgress` keeps the results.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ from ..scene.scene_objects import TABLE_HEIGHT
 from ..simulation.state import State
 
 MAX_OFFSET, MAX_ANGLE = 0.010, np.deg2rad(5.0)
-"""A book is in its slot within these [m, rad]."""
+"""Tolerances of a book in its slot [m, rad]."""
 STILL = 0.01
-"""A book slower than this is at rest [m/s]."""
+"""Speed below which a book counts as at rest [m/s]."""
 WITHDRAWN = 0.15
-"""Distance of the tcp to every shelved book's center from which on the hand has withdrawn [m]."""
+"""Distance of the tcp to every shelved book's center from which the hand counts as withdrawn [m]."""
 LOST = 0.04
-"""A book that was lifted and now rests farther than this from its slot was dropped [m]."""
+"""Distance from its slot beyond which a book that was lifted and is at rest was dropped [m]."""
 LOWEST = TABLE_HEIGHT - 0.05
-"""A book whose center is below this has fallen off the table [m]."""
+"""Height (z) of a book's center below which the book has fallen off the table [m]."""
 LIFTED = 0.02
-"""Height above the stand at which a book counts as lifted [m]."""
+"""Height above the stand from which a book counts as lifted [m]."""
 PUSHED, PUSHED_OVER = 0.05, np.deg2rad(15.0)
-"""A clutter book that was moved or turned by more than this was pushed over [m, rad]."""
+"""Displacement and turn beyond which a clutter book counts as pushed over [m, rad]."""
 
 
 class ShelveVerdict(NamedTuple):
-    """What the compiled judge says of a state; counts and flags as whole numbers.
+    """Verdict of the compiled judge on a state; counts and flags are whole numbers.
 
     Attributes:
-        placed: books in their slots, from the first on.
-        held: the next book is in the hand.
-        raised: and is lifted.
-        settled: all books are in their slots and at rest, and the hand has withdrawn.
-        lost: a book that was lifted rests elsewhere.
-        fallen: a book is off the table.
-        toppled: a clutter book was pushed over.
-        unwanted: pairs that touch and should not.
-        low: the smaller owner of the last of them, or -1.
-        high: the other owner.
+        placed: number of books in their slots, counted from the first.
+        held: whether the next book is in the hand.
+        raised: whether it was also lifted.
+        settled: whether all books are in their slots and at rest, and the hand has withdrawn.
+        lost: whether a book was lifted and now rests elsewhere.
+        fallen: whether a book is off the table.
+        toppled: whether a clutter book was pushed over.
+        unwanted: number of pairs in unwanted contact.
+        low: smaller owner of the last such pair, or -1.
+        high: larger owner of the last such pair, or -1.
     """
 
     placed: int
@@ -62,30 +62,40 @@ class ShelveVerdict(NamedTuple):
 
 @kernel
 def distance(a, b):
-    """Of two points, or of two poses' places [m]."""
+    """Return the distance [m] of two points or poses.
+
+    Args:
+        a: (3,) point, or (7,) pose of which only the position counts.
+        b: (3,) point or (7,) pose, likewise.
+    """
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @kernel
 def turn(a, b):
-    """Angle between two poses (7,) [rad]."""
+    """Return the angle between two poses [rad].
+
+    Args:
+        a: (7,) pose, x y z [m] and wxyz.
+        b: (7,) pose, likewise.
+    """
     cosine = abs(a[3] * b[3] + a[4] * b[4] + a[5] * b[5] + a[6] * b[6])
     return 2.0 * math.acos(min(1.0, cosine))
 
 
 @kernel
 def allowed_contact(low, high, placed, handed, n):
-    """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
+    """Return whether two owners may touch.
 
-    Wanted are books on and in furniture, books that wait on the table and on each other, clutter beside clutter,
-    and the fingers on the book that is being fetched, held or was let go last.
+    Wanted contacts are books on and in furniture, waiting books on the table and on each other, clutter beside clutter,
+    and the fingers on the book that is being fetched, is held or was released last.
 
     Args:
-        low: smaller owner.
-        high: other owner.
-        placed: books in their slots.
-        handed: books that were handed over; the ones after them wait.
-        n: books to shelve; the objects after them are clutter.
+        low: smaller owner, see `WORLD` in `scene`.
+        high: larger owner.
+        placed: number of books in their slots.
+        handed: number of books handed over; the later ones wait.
+        n: number of books to shelve; later objects are clutter.
     """
     if low == high or (low == ARM and high == FINGERS):
         return True
@@ -104,17 +114,17 @@ def allowed_contact(low, high, placed, handed, n):
 
 @kernel
 def judge_state(poses, velocities, tcp, touching, goals, start, handed, lifted, errors):
-    """Judge a state: the entries of a `ShelveVerdict`.
+    """Judge a state; return the entries of a `ShelveVerdict`.
 
     Args:
-        poses: (m, 7) books, then clutter.
-        velocities: (m, 3) of them [m/s].
-        tcp: (n_arms, 7) the tools.
-        touching: (owners, owners) who touches whom, see `State`.
-        goals: (n, 7) the slots of the books.
-        start: (m, 7) where everything was; of a book where it was handed over.
-        handed: number of books that were handed over.
-        lifted: (n,) 1 once a book was lifted; renewed.
+        poses: (m, 7) poses of books, then clutter, x y z [m] and wxyz.
+        velocities: (m, 3) their velocities [m/s].
+        tcp: (n_arms, 7) tcp poses.
+        touching: (owners, owners) contacts, see `State`.
+        goals: (n, 7) slots of the books.
+        start: (m, 7) initial poses; of a book its pose when handed over.
+        handed: number of books handed over.
+        lifted: (n,) 1 once a book was lifted; updated.
         errors: (2, n) result: distance [m] and angle [rad] of each book to its slot.
     """
     n, placed, counting, quiet, lost, fallen, toppled = len(goals), 0, True, True, False, False, False
@@ -149,7 +159,15 @@ def judge_state(poses, velocities, tcp, touching, goals, start, handed, lifted, 
 
 @kernel
 def shaped(poses, goals, tcp, placed, held):
-    """Dense reward in [0, 1]: the share of books shelved, and of the current one reached, grasped and carried."""
+    """Return the dense reward in [0, 1]: share of books shelved, and of the current one reached, grasped and carried.
+
+    Args:
+        poses: (m, 7) poses of books, then clutter, x y z [m] and wxyz.
+        goals: (n, 7) slots of the books.
+        tcp: (n_arms, 7) tcp poses.
+        placed: number of books in their slots.
+        held: whether the next book is in the hand.
+    """
     n = len(goals)
     if placed == n:
         return 1.0
@@ -160,13 +178,13 @@ def shaped(poses, goals, tcp, placed, held):
 
 
 class ShelveProgress(Progress):
-    """What has happened in an episode so far, renewed from the simulator's state at each step.
+    """Progress of shelving, updated from the simulator's state at each step.
 
     Args:
-        goals: (n, 7) the slots of the books.
-        start: (m, 7) where books and clutter are at the start.
-        dt: seconds between states.
-        in_hand: the first book is in the hand from the start.
+        goals: (n, 7) slots of the books, x y z [m] and wxyz.
+        start: (m, 7) poses of books and clutter at the start.
+        dt: time between states [s].
+        in_hand: whether the first book is in the hand from the start.
     """
 
     def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float, *, in_hand: bool = False):
@@ -186,31 +204,31 @@ class ShelveProgress(Progress):
 
     @property
     def motion_index(self) -> float:
-        """2k while book k is to be fetched, 2k + 1 while it is held."""
+        """Index of the current motion: 2k while fetching book k, 2k + 1 while holding it."""
         return float(2 * self.placed + self.held)
 
     @property
     def failed(self) -> bool:
-        """A book is off the table."""
+        """True once a book is off the table."""
         return self._failure == "off_table"
 
     @property
     def stage(self) -> str:
-        """The furthest progress in words."""
+        """Furthest progress in words."""
         return self._stages[self._best_stage]
 
     @property
     def failure(self) -> str:
-        """Why it cannot succeed as things are, "" if it can."""
+        """Reason why the task cannot succeed at present, "" if it can."""
         return self._failure
 
     def hand_over(self, pose: np.ndarray) -> None:
-        """The next book now lies at a pose (7,) on the stand."""
+        """Register that the next book now lies at a pose (7,) on the stand."""
         self._start[self.handed] = pose
         self.handed += 1
 
     def update(self, state: State) -> ShelveVerdict:
-        """Take in a new state."""
+        """See `Progress`."""
         self._errors = np.empty((2, self.n_books))
         poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
         known = (self._goals, self._start, self.handed, self._lifted, self._errors)
@@ -223,11 +241,11 @@ class ShelveProgress(Progress):
         return verdict
 
     def reward(self, state: State) -> float:
-        """The dense reward of the state taken in last."""
+        """See `Progress`."""
         return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
     def task_info(self) -> dict[str, Any]:
-        """The task's own entries of `info`."""
+        """See `Progress`."""
         return {
             "books_placed": self.placed,
             "position_error": self._errors[0],
@@ -237,7 +255,12 @@ class ShelveProgress(Progress):
 
 
 def stage_name(best: int, n_books: int) -> str:
-    """The furthest progress in words."""
+    """Return the furthest progress in words.
+
+    Args:
+        best: 2 for each book shelved, plus 1 if the next one was lifted.
+        n_books: number of books.
+    """
     if best == 0:
         return "start"
     if best % 2:

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...planner import Box, Obstacle, Pose
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Obstacle, pack
-from ..core.environment import MAX_LAYOUTS, Observation, OneDemoEnv, checked_choice
-from ..core.obstacle_placement import ObstacleRequest, PlacementMotion
+from ...planner.geometry.shapes import pack
+from ..core.environment import MAX_LAYOUTS, Observation, TaskEnv, checked_choice
+from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints
 from ..core.spaces import pose_box
 from ..scene.body_clearance import arm_clearance
@@ -27,37 +27,37 @@ from .rules import ShelveProgress
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
 LIFT, WAY_IN = 0.15, 0.22
-"""Heights above the stand and way before the slot at the ends of a carry [m]."""
+"""Height of the hand above the stand, and distance in front of the slot, at the ends of a carry [m]."""
 GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
-"""Hand (tcp) in the frame of a book that it holds by the spine, 25 mm deep, fingers on its covers."""
+"""Tcp pose in the frame of a book held by the spine, 25 mm deep, fingers on its covers."""
 SPREAD = 0.15
-"""Of obstacles about the hand's way [m]: a book and the hand behind it sweep far more than the way itself, which is
-so short that what lies right on it would be in the way of the hand before the slot, too."""
+"""Largest offset of obstacles from the hand's path [m]: book and hand sweep far more than the path itself, which is
+so short that an obstacle right on it would also block the hand in front of the slot."""
 START_CLEARANCE = 0.03
-"""The robot is at least this far from the first book at the start [m]."""
+"""Least distance of the robot to the first book at the start [m]."""
 CLEAR = 0.08
-"""The robot is at least this far from the stand while a book is put there [m]."""
+"""Least distance of the robot to the stand while a book is put there [m]."""
 PAPER_SIZES = (0.06, 0.09)
-"""Of the obstacles that appear while the second and the third book are placed [m]."""
+"""Sizes of the obstacles that appear while the second and the third book are placed [m]."""
 
 
-class ShelveEnv(OneDemoEnv[ShelveProgress]):
+class ShelveEnv(TaskEnv[ShelveProgress]):
     """Shelve three books in the upper shelf of a cluttered cupboard, with one arm.
 
     ## Description
     A cupboard with two shelves stands on a table, turned so that the robot reaches it: for the Panda, books go in
     along a yaw of about 75 degrees; other books stand in it. Three books (160 x 220 x 35 mm, 0.3 kg) are handed over
     one at a time on a stand at about shelf height, lying, spine over its edge. They must be put upright, spine to the
-    front, into three slots 70 mm apart. They are held by friction between the fingers only.
+    front, into three slots 70 mm apart. Only friction holds them between the fingers.
 
-    Handing over is the human's part, and the environment plays it: books that are not handed over yet wait in a
-    pile on the table, and when book k is in its slot, let go, and the whole robot is 8 cm away from its place, the
-    next book is taken from the pile and laid onto the stand at once. The robot never touches a book that is moved
-    so. Everything else is physics.
+    A human would hand the books over; the environment plays this part: later books wait in a pile on the table. Once
+    a book is in its slot and released, and the whole robot is 8 cm away from the next book's place on the stand, the
+    next book moves from the pile to the stand at once. The robot never touches a book that is moved like this.
+    Everything else is physics.
 
-    Success is judged from the simulator: every book within 10 mm and 5 degrees of its slot, touched by no finger, at
-    rest, the hand withdrawn by 15 cm, no clutter book moved by more than 5 cm or turned by more than 15 degrees, for
-    half a second.
+    Success is judged from the simulator: for half a second every book is within 10 mm and 5 degrees of its slot,
+    touched by no finger and at rest, the hand has withdrawn by 15 cm, and no clutter book was moved by more than 5 cm
+    or turned by more than 15 degrees.
 
     ## Action Space
     `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
@@ -67,7 +67,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or books. Poses are `x y z [m]`, then quaternion wxyz.
@@ -76,21 +76,21 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
     |---|---|---|
     | `joint_positions` | (1, 7) | [rad] |
     | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
     | `gripper_opening` | (1,) | gap between the finger pads [m] |
     | `object_pose` | (n + 5, 7) | the books, then the clutter; a book's x points away from its spine, z along it |
-    | `goal_pose` | (n, 7) | where each book must end; constant during an episode |
+    | `goal_pose` | (n, 7) | goal of each book; constant during an episode |
     | `furniture_pose` | (3, 7) | cupboard, stand and the stand's foot; constant during an episode |
     | `motion_index` | (1,) | 2k while book k is to be fetched, 2k + 1 while it is held, 2n when all are shelved |
-    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
     | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | the obstacles |
-    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+    | `obstacle_pose` | (3, 7) | poses of the obstacles |
+    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
 
     ## Rewards
-    `reward="dense"`: in [0, 1], the share of the task that is done, with reaching, grasping and carrying of the
-    current book in between. `reward="sparse"`: 1 with success, else 0.
+    `reward="dense"`: in [0, 1], the completed share of the task, including reaching, grasping and carrying of the
+    current book. `reward="sparse"`: 1 with success, else 0.
 
     ## Starting State
     By `level`: L0 the nominal places; L1 the stand moved by up to 4 cm, 5 cm lower to 2.5 cm higher, turned by up to
@@ -98,10 +98,10 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
     3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 15
     degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. Each robot has its own nominal places.
 
-    L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way from stand to cupboard,
-    L4 one that swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the
-    forearm passes. R, S and T start as L1 does. Obstacles are solid; they overlap what hand and book sweep on the
-    straight way and leave room at the start, at every grasp and at every slot, whatever method is used.
+    L3, L4 and F are L2 with obstacles: L3 has one to three static ones of 3 to 10 cm on the path from stand to
+    cupboard, L4 one that swings across the path at up to 0.3 m/s or appears during a carry, F a static one where the
+    forearm passes. R, S and T start as L1 does. Obstacles are solid. They overlap the volume that hand and book sweep
+    on the straight path, and leave clearance at the start, at every grasp and at every slot, for any method.
 
     ## Episode End
     `terminated` with a settled success, or when a book has fallen off the table. `truncated` after 90 s (Gymnasium's
@@ -110,13 +110,13 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
     ## Info
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
     `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
-    what it holds), `layouts_refused` (starts that had no room for the obstacles), `books_placed`,
+    the held object), `layouts_refused` (starts that had no space for the obstacles), `books_placed`,
     `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
 
     ## Arguments
-    `robot="Panda"` (others: `onedemo.envs.shelve.places.SHELF_PLACES`; of Baxter the right arm), `n_books=3` (1 to 3),
-    `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`, `obstacles=None` (what the
-    level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"` (two of different
+    `robot="Panda"` (others: `onedemo.envs.shelve.places.SHELF_PLACES`; Baxter's right arm), `n_books=3` (1 to 3),
+    `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`, `obstacles=None` (those of
+    the level) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"` (two of different
     size appear while the last two books are carried), `control_mode="joint_velocity" | "ee_twist"`,
     `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
     `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `ScheduledObstacle`), `stand_pose` (7,),
@@ -144,11 +144,12 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
             raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
         self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
         objects, furniture = books(n_books), (cupboard(), *stand())
-        self._places = places_of(SHELF_PLACES, robot, "shelve")
-        robot_named(robot).check_grip(BOOK_SIZE[1], robot, "a book")
+        kind = robot_named(robot)
+        self._places = places_of(SHELF_PLACES, kind, "shelve")
+        kind.check_grip(BOOK_SIZE[1], "a book")
         super().__init__(
             name="shelve",
-            robot=robot,
+            robot=kind,
             things=SceneSpec(objects, furniture),
             goals=n_books,
             motions=2 * n_books,
@@ -177,7 +178,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
         return Start(joints, drawn.objects(), self._furniture)
 
     def _drawn_clear(self, options: dict[str, Any], layout: str) -> tuple[ShelfLayout, np.ndarray]:
-        """A layout and start joints at which the hand is not already at the book."""
+        """Draw a layout, and start joints at which the hand is clear of the first book."""
         lower, upper = [arm.lower for arm in self.arms], [arm.upper for arm in self.arms]
         for _ in range(MAX_LAYOUTS):
             drawn = shelf_layout(self.np_random, RANGES[layout], self._places, self.n_books, self._ready.shape)
@@ -190,7 +191,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
         raise BadOption("stand_pose", "the robot would start at the book; give joint_positions that are away from it")
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Act for one control step; afterwards the next book is handed over, if it is time."""
+        """Apply an action for one control step; afterwards hand over the next book if it is due."""
         reached = super().step(action)
         k = self._progress.handed
         if (
@@ -204,7 +205,7 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
         return reached
 
     def _is_clear(self, place: Pose, joints: np.ndarray, clearance: float) -> bool:
-        """Whether the whole robot, at joints (n_arms, dof), keeps the clearance [m] from a book's place."""
+        """Return whether the whole robot, at joints (n_arms, dof), keeps a clearance [m] from a book's place."""
         book = pack([Obstacle(Box(BOOK_SIZE), place)])
         return all(
             arm_clearance(arm, body, q, book) >= clearance
@@ -212,20 +213,20 @@ class ShelveEnv(OneDemoEnv[ShelveProgress]):
         )
 
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """The carries: from above the stand to before the slot."""
-        legs = []
+        """Return the carries: from above the stand to in front of the slot."""
+        motions = []
         for k, goal in enumerate(self._goal_pose):
             grasp, release = self._drawn.handed(k) @ GRASP, Pose.from_vector(goal) @ GRASP
             up = Pose.from_position_quaternion([0.0, 0.0, LIFT])
             back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
             keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
             held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
-            legs.append(PlacementMotion(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
-        return legs
+            motions.append(PlacementMotion(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
+        return motions
 
-    def _paper(self, legs: list[PlacementMotion]) -> list[ObstacleRequest]:
-        """One appears while the last but one book is carried, another one, of another size, with the last."""
-        last = len(legs) - 1
+    def _paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
+        """Return two obstacles of different size: one appears with the last but one book, one with the last."""
+        last = len(motions) - 1
         return [ObstacleRequest("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
 
     def _ghosts(self) -> list[Ghost]:

@@ -1,1 +1,1 @@
-"""What happens at every step: physics, obstacles, distances, pictures."""
+"""Simulation of a scene, step by step: physics, obstacles, distances, images."""

@@ -1,4 +1,4 @@
-"""Bodies in the way: their shape, when they are there, how they move. Solid to the robot, moved by nobody's force."""
+"""Obstacle bodies: solid, kinematic (mocap), scheduled."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Capsule, Shape, Sphere
+from ...planner import Box, Capsule, Pose, Shape, Sphere
+from ...planner.geometry.shapes import SHAPE_KIND
 from ..scene.scene import CompiledScene
 from ..scene.scene_objects import extents, half_sizes
 
-KINDS: dict[type, float] = {Sphere: 1.0, Box: 2.0, Capsule: 3.0}
-"""Codes of `obstacle_shape`; 0 is none."""
+KINDS: dict[type, float] = {Sphere: SHAPE_KIND.sphere, Box: SHAPE_KIND.box, Capsule: SHAPE_KIND.capsule}
+"""Codes of `obstacle_shape`; 0 for no obstacle."""
 GEOM = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
 }
 PARKED_AT = (0.0, 0.0, -3.0)
-"""Where an obstacle is that is not there [m]."""
+"""Position of an inactive obstacle [m]."""
 CLEARANCE = 0.05
-"""Nothing appears nearer than this to the robot or an object [m]: it waits until there is room."""
+"""Least distance [m] of an appearing obstacle to the robot and all objects; the obstacle waits until it has it."""
 
 
 @dataclass(frozen=True)
 class ScheduledObstacle:
-    """A body in the way. Its center is at `center + long sin(w t + phase) + short cos(w t + phase)`.
+    """A scheduled obstacle, with its center at `center + long sin(w t + phase) + short cos(w t + phase)`.
 
     Attributes:
-        shape: a sphere, box or capsule.
-        center: (3,) [m].
-        rotation: wxyz (4,).
-        long: (3,) of the ellipse that it goes round [m]; zero for one that stands still.
-        short: (3,) [m], at right angles to `long`.
-        frequency: w [rad/s].
-        phase: [rad].
-        motion: index of the task's motion during which it appears; 0: it is there from the start.
-        delay: seconds after that motion's beginning.
-        leg: index of the motion that it was put in the way of.
+        shape: sphere, box or capsule.
+        center: (3,) center of the trajectory [m].
+        rotation: (4,) constant rotation, wxyz.
+        long: (3,) one half axis of the elliptic trajectory [m]; zero for a static obstacle.
+        short: (3,) other half axis [m], perpendicular to `long`.
+        frequency: angular frequency w [rad/s].
+        phase: phase [rad].
+        motion: index of the task's motion during which the obstacle appears; 0: present from the start.
+        delay: time after the start of that motion [s].
+        blocked_motion: index of the motion that the obstacle was placed to block.
     """
 
     shape: Shape
@@ -52,26 +52,30 @@ class ScheduledObstacle:
     phase: float = 0.0
     motion: int = 0
     delay: float = 0.0
-    leg: int = 0
+    blocked_motion: int = 0
 
     def position(self, seconds: float) -> np.ndarray:
-        """Center (3,) at a time [m]."""
+        """Return the center (3,) [m] at a time [s]."""
         angle = self.frequency * seconds + self.phase
         return np.array(self.center) + np.sin(angle) * np.array(self.long) + np.cos(angle) * np.array(self.short)
 
     def velocity(self, seconds: float) -> np.ndarray:
-        """Velocity (3,) of the center at a time [m/s]."""
+        """Return the velocity (3,) [m/s] of the center at a time [s]."""
         angle = self.frequency * seconds + self.phase
         along, across = np.cos(angle) * np.array(self.long), np.sin(angle) * np.array(self.short)
         return self.frequency * (along - across)
 
     def pose(self, seconds: float) -> Pose:
-        """Pose at a time."""
+        """Return the pose at a time [s]."""
         return Pose.from_position_quaternion(self.position(seconds), self.rotation)
 
 
 def described(shape: Shape) -> np.ndarray:
-    """(3,) of `obstacle_size`: extents of a box; radius, radius and length of a capsule; or a radius."""
+    """Return a shape's `obstacle_size` (3,) [m]: extents; radius, radius and length; or three times the radius.
+
+    Raises:
+        TypeError: the shape is no box, capsule or sphere.
+    """
     if isinstance(shape, Box):
         return np.array(shape.size)
     if isinstance(shape, Capsule):
@@ -82,11 +86,11 @@ def described(shape: Shape) -> np.ndarray:
 
 
 class ObstacleBodies:
-    """The obstacles of an episode in a simulation's model and data, and what is observed of them.
+    """Obstacles of an episode in a simulation's model and data, and their observation.
 
     Attributes:
-        scheduled_obstacles: those of this episode.
-        active: (n,) which are there.
+        scheduled_obstacles: obstacles of this episode.
+        active: (n,) whether each obstacle is present.
     """
 
     def __init__(self, scene: CompiledScene, model: mujoco.MjModel, data: mujoco.MjData):
@@ -99,11 +103,11 @@ class ObstacleBodies:
 
     @property
     def count(self) -> int:
-        """How many there can be."""
+        """Largest number of obstacles at once."""
         return len(self._index)
 
     def reset(self, scheduled_obstacles: tuple[ScheduledObstacle, ...]) -> None:
-        """Take the obstacles of a new episode; those there from the start are put in place."""
+        """Take over the obstacles of a new episode; those present from the start are put in place."""
         self.scheduled_obstacles = scheduled_obstacles
         self.active[:] = False
         self._due[:] = np.inf
@@ -116,12 +120,12 @@ class ObstacleBodies:
                 self._show(slot, 0.0)
 
     def advance(self, seconds: float, motion: float, has_room: Any) -> None:
-        """Move all to where they are at a time, and let appear what is due.
+        """Move all obstacles to their place at a time, and make due ones appear.
 
         Args:
-            seconds: since the episode's start, at the end of the coming control step.
+            seconds: time since the episode's start [s], at the end of the coming control step.
             motion: index of the current motion.
-            has_room: called with a slot and a pose; whether a body may appear there.
+            has_room: function of slot and pose that returns whether an obstacle may appear there.
         """
         for slot, each in enumerate(self.scheduled_obstacles):
             if self.active[slot]:
@@ -134,7 +138,7 @@ class ObstacleBodies:
                 self._show(slot, seconds)
 
     def observed(self, seconds: float) -> dict[str, np.ndarray]:
-        """The entries of the observation, in new arrays."""
+        """Return the obstacle entries of the observation at a time [s], in new arrays."""
         entries = self._blank()
         if not self.scheduled_obstacles:
             return entries
@@ -152,7 +156,7 @@ class ObstacleBodies:
         return {f"obstacle_{key}": np.zeros((self.count, *shape)) for key, shape in rows.items()}
 
     def _form(self, slot: int, shape: Shape) -> None:
-        """Give a slot's geoms a shape, and the bounds that MuJoCo's broad phase goes by."""
+        """Give a slot's geoms a shape, and the bounds for MuJoCo's broad phase."""
         model, (body, solid, seen) = self._model, self._index[slot]
         kind, half = half_sizes(shape)
         box = np.concatenate([np.zeros(3), 0.5 * extents(shape)])

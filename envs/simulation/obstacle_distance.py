@@ -1,4 +1,4 @@
-"""How near the robot comes to obstacles: exact distances of MuJoCo's collision geoms, asked for only where needed."""
+"""Distances of the robot to obstacles: exact, between MuJoCo's collision geoms, computed only where needed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, 
 from .moving_obstacles import CLEARANCE
 
 FAR = 10.0
-"""No distance is looked for beyond this [m]."""
+"""Largest distance that is computed [m]."""
 NUDGES = 1e-6 * np.vstack([np.eye(3), -np.eye(3)])
 ROBOT = (ARM, FINGERS, OTHER_ARM, OTHER_FINGERS)
 
 
 @kernel
 def _candidates(places, bounds, geoms, center, bound, best, found):
-    """Which of some geoms may be nearer than `best` to a body by their bounding balls; their number."""
+    """Collect the geoms that, by their bounding balls, may be nearer than `best` to a body; return their number."""
     count = 0
     for i in range(len(geoms)):
         geom = geoms[i]
@@ -34,7 +34,7 @@ def _candidates(places, bounds, geoms, center, bound, best, found):
 
 
 class ObstacleDistance:
-    """Distances of a simulated robot, and of what it holds, to obstacles."""
+    """Distances of a simulated robot, and of objects it holds, to obstacles."""
 
     def __init__(self, scene: CompiledScene, model: mujoco.MjModel, data: mujoco.MjData):
         self._model, self._data = model, data
@@ -47,15 +47,15 @@ class ObstacleDistance:
         self._smallest = math.inf
 
     def reset(self) -> None:
-        """Forget the last episode."""
+        """Forget the previous episode."""
         self._smallest = math.inf
 
     def smallest(self, active: np.ndarray, touching: np.ndarray) -> float:
-        """The smallest distance [m] so far in the episode, the present one included.
+        """Return the smallest distance [m] so far in the episode, including the present one.
 
         Args:
-            active: (n,) which obstacles are there.
-            touching: (owners, owners) who touches whom: what the fingers touch is held.
+            active: (n,) whether each obstacle is present.
+            touching: (owners, owners) contacts, see `State`; objects touched by the fingers count as held.
         """
         for slot in np.flatnonzero(active):
             self._take(slot, self._robot)
@@ -65,9 +65,14 @@ class ObstacleDistance:
         return self._smallest
 
     def has_room(self, slot: int, pose: Pose) -> bool:
-        """Whether an obstacle may appear at a pose: the robot and all objects are `CLEARANCE` away."""
+        """Return whether an obstacle may appear at a pose: the robot and all objects are `CLEARANCE` away.
+
+        Args:
+            slot: index of the obstacle.
+            pose: pose of the obstacle in the world.
+        """
         data, geom = self._data, self._solid[slot]
-        # MuJoCo computes these two anew at the next step
+        # MuJoCo recomputes both at the next step
         data.geom_xpos[geom], data.geom_xmat[geom] = pose.position, pose.rotation.ravel()
         return all(self._nearest(slot, geoms, CLEARANCE) >= CLEARANCE for geoms in (self._robot, *self._objects))
 
@@ -75,7 +80,7 @@ class ObstacleDistance:
         self._smallest = self._nearest(slot, geoms, self._smallest)
 
     def _nearest(self, slot: int, geoms: np.ndarray, best: float) -> float:
-        """The smaller of `best` and the distance of an obstacle to some geoms."""
+        """Return the smaller of `best` and the distance [m] of an obstacle to the given geoms."""
         model, data, own = self._model, self._data, int(self._solid[slot])
         center, bound = data.geom_xpos[own], model.geom_rbound[own]
         count = _candidates(data.geom_xpos, model.geom_rbound, geoms, center, bound, best, self._found)
@@ -84,10 +89,10 @@ class ObstacleDistance:
         return best
 
     def _distance(self, geom: int, own: int, farthest: float) -> float:
-        """MuJoCo's distance [m]; where it says exactly zero, the same with the obstacle nudged.
+        """Return MuJoCo's distance [m]; where it is exactly zero, the distance with the obstacle nudged.
 
-        Up to MuJoCo 3.9 at least, about one in a thousand distances to meshes and boxes comes out as 0.0 although
-        centimetres are between; from a micrometre beside, it comes out right.
+        Up to MuJoCo 3.9 at least, about one in a thousand distances to meshes and boxes comes out as 0.0 for geoms that
+        are centimeters apart; with one of them moved by a micrometer, the distance is right.
         """
         distance = mujoco.mj_geomDistance(self._model, self._data, geom, own, farthest, None)
         if distance != 0.0:

@@ -1,4 +1,4 @@
-"""Images and a window of a simulation; OpenGL is not touched before the first picture."""
+"""Images and a window of a simulation; OpenGL is not touched before the first image."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...planner.errors import RenderingUnavailable
-from ...planner.geometry.shapes import Shape
+from ...planner import Shape
+from ..errors import RenderingUnavailable
 from ..scene.scene_objects import half_sizes
 
 LOGGER = logging.getLogger(__name__)
 WIDTH, HEIGHT = 640, 480
 GHOST_COLOR = (0.35, 0.55, 0.95, 0.16)
 BACKENDS = {"egl": "EGL", "osmesa": "OSMesa", "glfw": None}
-"""MuJoCo's offscreen backends and the library that each needs."""
+"""MuJoCo's offscreen backends, with the library that each needs."""
 
 
 def _backends() -> list[str]:
-    """The backends to try, in order: what MUJOCO_GL names, else what is installed."""
+    """Return the backends to try, in order: the one named by MUJOCO_GL, else the installed ones."""
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     if wanted in BACKENDS:
         return [wanted]
@@ -36,10 +36,10 @@ def _backends() -> list[str]:
 
 
 def _opened_context(width: int, height: int) -> Any:
-    """A current OpenGL context.
+    """Open an OpenGL context and make it current.
 
     Raises:
-        RenderingUnavailable: none could be opened.
+        RenderingUnavailable: no context could be opened.
     """
     reasons = []
     for name in _backends():
@@ -54,13 +54,13 @@ def _opened_context(width: int, height: int) -> Any:
 
 @dataclass(frozen=True)
 class View:
-    """Where the camera is.
+    """Camera view.
 
     Attributes:
-        look_at: (3,) what it looks at [m].
-        distance: from there [m].
-        azimuth: direction that it looks in [degrees].
-        elevation: negative from above [degrees].
+        look_at: (3,) point at the center of the image [m].
+        distance: distance of the camera from this point [m].
+        azimuth: viewing direction [degrees].
+        elevation: viewing elevation [degrees], negative from above.
     """
 
     look_at: tuple[float, float, float] = (-0.12, 0.0, 0.93)
@@ -74,7 +74,7 @@ TABLE_VIEW = View()
 
 @dataclass(frozen=True)
 class Ghost:
-    """A shape that is drawn but not there, at a pose (7,)."""
+    """A shape at a pose (7,), drawn without being simulated."""
 
     pose: np.ndarray
     shape: Shape
@@ -98,7 +98,7 @@ def _free(context: mujoco.MjrContext, opengl: Any) -> None:
 
 
 class _Offscreen:
-    """A picture buffer of a model."""
+    """Offscreen image buffer of a model."""
 
     def __init__(self, model: mujoco.MjModel):
         model.vis.global_.offwidth = max(WIDTH, model.vis.global_.offwidth)
@@ -133,7 +133,7 @@ class _Offscreen:
 
 
 class Renderer:
-    """The scene's camera: pictures in memory, or MuJoCo's window."""
+    """Camera of a scene: images in memory, or MuJoCo's window."""
 
     def __init__(self, model: mujoco.MjModel, view: View):
         self._model, self._view = model, view
@@ -148,7 +148,11 @@ class Renderer:
         self._told = False
 
     def image(self, data: mujoco.MjData, ghosts: Iterable[Ghost] = ()) -> np.ndarray:
-        """(HEIGHT, WIDTH, 3) uint8; ghosts are translucent.
+        """Return an image (HEIGHT, WIDTH, 3) uint8.
+
+        Args:
+            data: state to draw.
+            ghosts: shapes to draw translucently.
 
         Raises:
             RenderingUnavailable: no OpenGL library can be used.
@@ -158,7 +162,7 @@ class Renderer:
         return self._offscreen.image(data, self._camera, self._options, ghosts)
 
     def show(self, data: mujoco.MjData) -> None:
-        """Bring the window up to date; the first call opens it, if there is a display."""
+        """Update the window; the first call opens it, if there is a display."""
         if self._window is None and not self._has_display():
             return
         if self._window is None:
@@ -170,7 +174,7 @@ class Renderer:
         self._window.sync()
 
     def close(self) -> None:
-        """Free the picture buffer and close the window."""
+        """Free the image buffer and close the window."""
         if self._offscreen is not None:
             self._offscreen.close()
         if self._window is not None:

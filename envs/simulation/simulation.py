@@ -1,4 +1,4 @@
-"""A scene being simulated by MuJoCo alone."""
+"""Simulation of a scene by MuJoCo alone."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...planner.robot.kinematics import FRAME
 from ..scene.arm_index import ArmIndex
+from ..scene.robots import Robot
 from ..scene.scene import FINGERS, FIRST_OBJECT, compiled_scene
 from ..scene.scene_objects import SceneSpec
 from .moving_obstacles import ObstacleBodies, ScheduledObstacle
@@ -21,15 +22,15 @@ PHYSICS_DT = 0.002
 
 
 class Start(NamedTuple):
-    """Where everything is when an episode begins.
+    """Initial state of an episode.
 
     Attributes:
         joints: (n_arms, dof) joint positions [rad].
         objects: (n_objects, 7) world poses, x y z [m] and wxyz.
-        furniture: (n_furniture, 7) world poses.
-        beads: (n_beads, 3) places [m].
-        scheduled_obstacles: the obstacles.
-        grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing round something; nan: it is open.
+        furniture: (n_furniture, 7) world poses, likewise.
+        beads: (n_beads, 3) world positions [m].
+        scheduled_obstacles: obstacles of the episode.
+        grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing on an object; nan for an open gripper.
     """
 
     joints: np.ndarray
@@ -41,9 +42,9 @@ class Start(NamedTuple):
 
 
 class Simulation:
-    """A scene being simulated: state in, physics, state out."""
+    """A simulated scene: action in, physics, state out."""
 
-    def __init__(self, robot: str, things: SceneSpec, sides: tuple[str, ...] | None = None):
+    def __init__(self, robot: Robot, things: SceneSpec, sides: tuple[str, ...] | None = None):
         self.scene = compiled_scene(robot, things, sides)
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
@@ -57,7 +58,7 @@ class Simulation:
         attitudes = [arm.arm.fk(q).quaternion for arm, q in zip(arms, self.scene.home, strict=True)]
         self._homes = np.column_stack([attitudes, offsets])
         self._chains = np.array([arm.arm.chain for arm in arms])
-        self._frames = np.empty((arms[0].arm.dof, FRAME))
+        self._frames = np.empty((arms[0].arm.dof, FRAME.width))
         self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
         bodies, owners = self.scene.objects, FIRST_OBJECT + len(things.objects)
         self._object_places = model.jnt_qposadr[model.body_jntadr[bodies]].astype(np.int64)
@@ -68,7 +69,7 @@ class Simulation:
         self._no_beads = np.zeros((0, 3))
 
     def reset(self, start: Start) -> None:
-        """Put everything in place, at rest, with open grippers where none holds something."""
+        """Put everything in place, at rest, with grippers open unless they hold an object."""
         mujoco.mj_resetData(self.model, self.data)
         grips = np.full(len(self.scene.arms), np.nan) if start.grips is None else start.grips
         for arm, q, gap, widest in zip(self.scene.arms, start.joints, grips, self._widest, strict=True):
@@ -87,37 +88,50 @@ class Simulation:
         mujoco.mj_forward(self.model, self.data)
 
     def put(self, index: int, pose: np.ndarray) -> None:
-        """Lay an object at a pose (7,), at rest: for what a human does, never for what the robot touches."""
+        """Place an object at rest: for a human's actions, never for objects that the robot touches.
+
+        Args:
+            index: index of the object.
+            pose: (7,) pose of the object, x y z [m] and wxyz.
+        """
         address, dof = self._object_index[index]
         self.data.qpos[address : address + 7] = pose
         self.data.qvel[dof : dof + 6] = 0.0
 
     def _put(self, arm: ArmIndex, q: np.ndarray, inwards: float) -> None:
-        """Put an arm at joints q (dof,), open, or closing with each finger some way [m] inwards."""
+        """Put an arm at joints q (dof,), its gripper open, or closing with each finger some distance [m] inwards."""
         self.data.qpos[arm.qpos] = q
         self.data.act[arm.act] = q
         self.data.ctrl[arm.grip] = arm.closed if inwards else arm.opened
         self.data.qpos[arm.finger_qpos] = arm.finger_open + inwards * arm.finger_inwards
 
     def advance_obstacles(self, seconds: float, motion: float) -> None:
-        """Move the obstacles to where they are `seconds` after the start of the episode; `motion` is the task's."""
+        """Move the obstacles to their place at a time.
+
+        Args:
+            seconds: time since the start of the episode [s].
+            motion: the task's motion index.
+        """
         if self.obstacles.scheduled_obstacles:
             self.obstacles.advance(seconds, motion, self._near.has_room)
 
     def nearest_obstacle(self) -> float:
-        """Smallest distance [m] of the robot, or of what it holds, to an obstacle in this episode; infinite if none."""
+        """Return the episode's smallest distance [m] of robot or held object to an obstacle; infinite if none."""
         if not self.obstacles.scheduled_obstacles:
             return math.inf
         return self._near.smallest(self.obstacles.active, self._touching)
 
     def step(self, action: np.ndarray, full: np.ndarray, bound: float, substeps: int) -> int:
-        """Hold an action for some physics steps; -1, or the index of an entry that is not finite, without a step.
+        """Hold an action for some physics steps.
 
         Args:
             action: (n_arms * (dof + 1),) per arm its joints, then its gripper.
             full: (n_arms, dof) joint speeds [rad/s] of an entry 1.
-            bound: entries are clipped to plus and minus this.
-            substeps: physics steps.
+            bound: entries are clipped to plus and minus this bound.
+            substeps: number of physics steps.
+
+        Returns:
+            -1, or the index of an entry that is not finite; in this case nothing is simulated.
         """
         bad = command(action, full, bound, self._servos, self._grips, self._ctrl)
         if bad < 0:
@@ -125,20 +139,20 @@ class Simulation:
         return bad
 
     def held(self) -> np.ndarray:
-        """(n_arms, n_objects) what the fingers of each arm touched in the state that was read last."""
+        """Return (n_arms, n_objects) whether the fingers of each arm touched an object in the last state read."""
         fingers = FINGERS + 2 * np.arange(len(self._servos))
         return self._touching[fingers, FIRST_OBJECT:] != 0.0
 
     def widest_opening(self, index: int) -> float:
-        """Gap between the finger pads of an open gripper [m]."""
+        """Return the gap between the finger pads of an arm's open gripper [m]."""
         return self._widest[index]
 
     def read(self) -> State:
-        """The state now, in new arrays."""
+        """Return the present state, in new arrays."""
         (count, dof), objects = self._servos.shape, len(self._object_index)
         q, qdot, tcp, opening = np.empty((count, dof)), np.empty((count, dof)), np.empty((count, 7)), np.empty(count)
         poses, velocities = np.empty((objects, 7)), np.empty((objects, 3))
-        geoms = self.data.contact.geom.copy()  # no view: of one contact it is another type, to be compiled anew
+        geoms = self.data.contact.geom.copy()  # a view of one contact has another type, which would be compiled anew
         qpos, qvel, *frames = self._views
         read_arms(qpos, qvel, *frames, self._chains, self._frames, self._arm_index, self._homes, q, qdot, tcp, opening)
         read_objects(qpos, qvel, self._object_index, geoms, self.scene.owner, poses, velocities, self._touching)
@@ -146,7 +160,7 @@ class Simulation:
         return State(q, qdot, tcp, opening, poses, velocities, self._touching, beads)
 
     def contact_name(self, pair: tuple[int, int]) -> str:
-        """Name of a contact of two owners, as in `link5-block1`."""
+        """Return the name of a contact between two owners, like `link5-block1`."""
         geoms = self.data.contact.geom
         owners = np.sort(self.scene.owner[geoms], axis=1)
         hit = np.flatnonzero((owners == pair).all(axis=1))[0]
@@ -158,7 +172,7 @@ class Simulation:
         return abs(float((left - right) @ closing))
 
     def _measured_opening(self, arm: ArmIndex) -> float:
-        """Gap of the open pads [m]; leaves the grippers open in the state."""
+        """Measure the gap of the open pads [m]; leaves the grippers open in the state."""
         mujoco.mj_resetData(self.model, self.data)
         for each in self.scene.arms:
             self.data.qpos[each.finger_qpos] = each.finger_open

@@ -1,7 +1,7 @@
-"""What goes into a simulation and what is read from it at each step, compiled: it runs fifty times per second.
+"""Actions into a simulation and states out of it at each step, compiled: this runs fifty times per second.
 
-After `mj_step` the processor's caches hold the physics and nothing else, so that every small array and every call
-costs five times what it costs in a loop. Hence one pass each way, and few arrays.
+After `mj_step` the processor's caches hold the physics and nothing else, so every small array and every call costs five
+times its cost in a loop. Hence one pass in each direction, and few arrays.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from ...planner.robot.kinematics import forward
 
 
 class State(NamedTuple):
-    """The measured state; the arrays are new at each reading, but for `touching`.
+    """The measured state; arrays are new at each reading, except `touching`.
 
     Attributes:
         joint_positions: (n_arms, dof) [rad].
         joint_velocities: (n_arms, dof) [rad/s].
-        tcp_pose: (n_arms, 7) x y z [m] and wxyz, its sign on the side of the home pose.
+        tcp_pose: (n_arms, 7) x y z [m] and wxyz, the sign on the side of the home pose.
         gripper_opening: (n_arms,) gap between the finger pads [m].
         object_pose: (n_objects, 7) x y z [m] and wxyz with w >= 0.
         object_velocity: (n_objects, 3) [m/s].
-        touching: (owners, owners) 1 where two owners touch, the smaller first; renewed in place.
+        touching: (owners, owners) 1 where two owners touch, the smaller first; updated in place.
         bead_position: (n_beads, 3) [m].
     """
 
@@ -42,16 +42,19 @@ class State(NamedTuple):
 
 @kernel
 def command(action, full, bound, servos, grips, ctrl):
-    """Write an action into `ctrl`; index of its first entry that is not finite, then nothing is written, or -1.
+    """Write an action into `ctrl`.
 
     Args:
-        action: (n_arms * (dof + 1),) per arm its joints, then its gripper: above 0 closes, below 0 opens to that
-            part of the widest gap, 0 leaves it.
+        action: (n_arms * (dof + 1),) per arm its joints, then its gripper: above 0 closes it, below 0 opens it to that
+            fraction of the widest gap, 0 leaves it unchanged.
         full: (n_arms, dof) joint speeds [rad/s] of an entry 1.
-        bound: entries are clipped to plus and minus this.
-        servos: (n_arms, dof) places of the joint speeds in `ctrl`.
-        grips: (n_arms, fingers, 3) per finger its place in `ctrl` and its controls when open and when closed.
-        ctrl: MuJoCo's controls.
+        bound: joint entries are clipped to plus and minus this bound.
+        servos: (n_arms, dof) indices of the joint speeds in `ctrl`.
+        grips: (n_arms, fingers, 3) per finger its index in `ctrl` and its controls when open and when closed.
+        ctrl: MuJoCo's controls, written to.
+
+    Returns:
+        -1, or the index of the first entry that is not finite; in this case nothing is written.
     """
     for k in range(len(action)):
         if not math.isfinite(action[k]):
@@ -72,7 +75,7 @@ def command(action, full, bound, servos, grips, ctrl):
 
 @kernel
 def _face(quaternion, reference):
-    """Give a quaternion the sign that is nearer to a reference."""
+    """Give a quaternion the sign nearer to a reference."""
     dot = 0.0
     for k in range(4):
         dot += quaternion[k] * reference[k]
@@ -83,11 +86,24 @@ def _face(quaternion, reference):
 
 @kernel
 def read_arms(qpos, qvel, site_xmat, geom_xpos, chains, frames, index, homes, q, qdot, tcp, opening):
-    """All arms: joints (n, dof), their speeds (n, dof), tcp poses (n, 7) and finger gaps (n,).
+    """Read joints, velocities, tcp poses and finger gaps of all arms.
 
     The tcp is the forward kinematics of these joints: MuJoCo's own frames are one physics step older than its
-    positions. `index` (n, 2 dof + 3) holds the addresses of positions and speeds, the site and the two pads; `homes`
-    (n, 5) the quaternion whose side the tcp's is given, and what [m] turns the distance of the pads into their gap.
+    positions.
+
+    Args:
+        qpos: MuJoCo's positions.
+        qvel: MuJoCo's velocities.
+        site_xmat: (nsite, 9) MuJoCo's site rotations.
+        geom_xpos: (ngeom, 3) MuJoCo's geom positions [m].
+        chains: kinematic chain of each arm, see `Arm.chain`.
+        frames: (dof, FRAME) workspace.
+        index: (n, 2 dof + 3) addresses of positions and velocities, the site and the two pads.
+        homes: (n, 5) quaternion that decides the tcp's sign, and offset [m] from the pads' distance to their gap.
+        q: (n, dof) result: joints [rad].
+        qdot: (n, dof) result: joint velocities [rad/s].
+        tcp: (n, 7) result: x y z [m] and wxyz.
+        opening: (n,) result: finger gaps [m].
     """
     arms, dof = q.shape
     for i in range(arms):
@@ -110,17 +126,17 @@ def read_arms(qpos, qvel, site_xmat, geom_xpos, chains, frames, index, homes, q,
 
 @kernel
 def read_objects(qpos, qvel, index, geoms, owner, poses, velocities, touching):
-    """All free bodies: poses (n, 7) with w >= 0, linear velocities (n, 3); who `touching` (owners, owners) whom.
+    """Read poses and velocities of all free bodies, and all contacts.
 
     Args:
         qpos: MuJoCo's positions.
-        qvel: MuJoCo's speeds.
-        index: (n, 2) addresses of positions and of speeds.
+        qvel: MuJoCo's velocities.
+        index: (n, 2) addresses of positions and velocities.
         geoms: (contacts, 2 or more) the two geoms of each contact.
-        owner: (ngeom,) whose geom it is.
-        poses: result.
-        velocities: result.
-        touching: result; the smaller owner first.
+        owner: (ngeom,) owner of each geom.
+        poses: (n, 7) result: x y z [m] and wxyz with w >= 0.
+        velocities: (n, 3) result: linear velocities [m/s].
+        touching: (owners, owners) result: 1 where two owners touch, the smaller first.
     """
     for i in range(len(index)):
         place, dof = index[i, 0], index[i, 1]

@@ -1,4 +1,4 @@
-"""Tcp twists as actions: joint speeds that the motors can follow, and commands that make the servos do so."""
+"""Tcp twists as actions: joint speeds that the motors can follow, and servo commands that achieve them."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ MAX_LINEAR, MAX_ANGULAR = 0.25, 1.2
 """Tcp speeds [m/s, rad/s] of a full `ee_twist` action."""
 LEAST_SQUARES_DAMPING = 0.02
 TORQUE_SHARE = 0.7
-"""Of the motors' torque limits, what changes of speed may ask for; the rest is for what the servos correct."""
+"""Share of the motors' torque limits that speed changes may use; the rest is for the servos' corrections."""
 FACTOR, SOLUTION = 6, 12
-"""Rows of the workspace after the six of the Gram matrix."""
+"""Workspace rows of the Cholesky factor and of the solution, after the six rows of the Gram matrix."""
 
 
 class TwistDrive:
-    """Makes the servos' commands of tcp twists.
+    """Conversion of tcp twists to servo commands.
 
-    Twists change at once, joints do not. If each motor went at its torque limit for as long as it needs, the hand would
-    be thrown off by centimeters, and each command that is felt 0.1 s late makes a fast policy sway about its goal.
-    Therefore all joints of an arm make the same share of a change that is too fast for one of them, and the commands
-    make up for the servos' lag and the arm's inertia.
+    Twists change at once, joint speeds do not. If each motor accelerated at its torque limit for as long as necessary,
+    the hand would deviate by centimeters, and commands that take effect 0.1 s late make a fast policy oscillate about
+    its goal. Therefore all joints of an arm make the same share of a change that is too fast for one of them, and the
+    commands compensate for the servos' lag and the arm's inertia.
 
     Args:
-        simulation: whose working arms are driven.
-        dt: seconds between actions.
+        simulation: simulation whose working arms are driven.
+        dt: time between actions [s].
     """
 
     def __init__(self, simulation: Simulation, dt: float):
@@ -43,14 +43,14 @@ class TwistDrive:
         self._work = np.zeros((SOLUTION + 1, 6))
 
     def reset(self) -> None:
-        """All joints are at rest."""
+        """Set all joint speeds to zero: the arms are at rest."""
         self._speeds[:] = self._changes[:] = 0.0
 
     def commands(self, twists: np.ndarray) -> np.ndarray:
-        """Rates (n_arms, dof) [rad/s] of the servos' set points until the next action; see `_followed`.
+        """Return rates (n_arms, dof) [rad/s] of the servos' set points until the next action; see `_followed`.
 
         Args:
-            twists: (n_arms, 6) linear and angular parts in world axes, as shares of the largest ones.
+            twists: (n_arms, 6) linear and angular parts in world axes, as fractions of the largest ones.
         """
         data, rates = self._sim.data, np.empty_like(self._speeds)
         mujoco.mj_fullM(self._sim.model, self._inertia, data.qM)
@@ -62,12 +62,12 @@ class TwistDrive:
         return rates
 
 
-# compiled not for speed alone: NumPy's linear algebra depends, in the last digit, on the number of threads
+# compiled not only for speed: the last digit of NumPy's linear algebra depends on the number of threads
 
 
 @kernel
 def _resolved(jacobian, rotation, twist, limits, work, speeds):
-    """Joint speeds (dof,) of a twist (6,), by damped least squares on the body Jacobian, within the arm's limits."""
+    """Compute the joint speeds (dof,) of a twist (6,) by damped least squares on the body Jacobian, within limits."""
     n, b = len(speeds), work[SOLUTION]
     for i in range(3):
         linear, angular = 0.0, 0.0
@@ -92,10 +92,10 @@ def _resolved(jacobian, rotation, twist, limits, work, speeds):
 
 @kernel
 def _followed(wanted, inertia, dofs, torques, dt, speeds, changes, rates):
-    """Bring the speeds (dof,) as near to the wanted ones as the motors can within dt, and the rates that do so.
+    """Bring the speeds (dof,) as near to the wanted ones as the motors can within dt; compute the set points' rates.
 
-    A servo's torque is stiffness (set point - q - lag q'), so that q' changes evenly from v to v + c within dt if the
-    set point's rate is v + c / 2 + lag c / dt + M (c - c_before) / (stiffness dt^2), M the arm's inertia.
+    A servo's torque is stiffness (set point - q - lag q'), so q' changes evenly from v to v + c within dt if the set
+    point's rate is v + c / 2 + lag c / dt + M (c - c_before) / (stiffness dt^2), where M is the arm's inertia.
     """
     n, worst = len(speeds), 1.0
     for i in range(n):

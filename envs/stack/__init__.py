@@ -1,1 +1,1 @@
-"""Stacking blocks, and its single motions."""
+"""Stacking blocks, and the single motions of reaching and placing."""

@@ -1,33 +1,43 @@
-"""Blocks on the table, and how a hand holds them."""
+"""Blocks on the table, and grasps of them."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...planner import Pose
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import Pose
 from ..scene.scene_objects import TABLE_HEIGHT
 from .layout import TABLE_EDGE, StackLayout
 from .rules import BLOCK, BLOCK_SIZE
 
 DOWN = (0.0, 1.0, 0.0, 0.0)
-"""A hand that points down, fingers closing along world x (wxyz)."""
+"""Rotation (wxyz) of a hand that points down, fingers closing along world x."""
 
 
 def block_grasps(block: np.ndarray, up: float = 0.0) -> list[Pose]:
-    """Hands (tcp) that hold a block (7,) from above by its narrow side, half a turn apart, `up` over its middle [m]."""
+    """Return the tcp poses that grasp a block from above across its narrow side, half a turn apart.
+
+    Args:
+        block: (7,) pose of the block, x y z [m] and wxyz.
+        up: height of the tcp above the block's center [m].
+    """
     pose = Pose.from_vector(block) @ Pose.from_position_quaternion([0.0, 0.0, up])
     yaws = (0.5 * np.pi, -0.5 * np.pi)
     return [pose @ Pose.from_yaw([0, 0, 0], yaw) @ Pose.from_position_quaternion([0, 0, 0], DOWN) for yaw in yaws]
 
 
 def above(pose: Pose, height: float) -> Pose:
-    """A pose moved up [m]."""
+    """Return a pose moved upwards.
+
+    Args:
+        pose: pose in the world.
+        height: vertical displacement [m].
+    """
     return Pose.from_position_quaternion([0, 0, height]) @ pose
 
 
 def block_poses(layout: StackLayout) -> tuple[np.ndarray, np.ndarray]:
-    """World poses (n, 7) of the blocks and (7,) of the lowest goal."""
+    """Return the world poses (n, 7) of the blocks, and the pose (7,) of the lowest goal."""
     rows = np.vstack([layout.blocks, layout.base])
     height = TABLE_HEIGHT + 0.5 * BLOCK_SIZE[2]
     zeros = np.zeros(len(rows))
@@ -37,7 +47,15 @@ def block_poses(layout: StackLayout) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_places(poses: np.ndarray, base: np.ndarray) -> None:
-    """Refuse blocks off the table or inside each other, and a base place off the table or tilted."""
+    """Refuse blocks that are off the table or overlap, and a base place that is off the table or tilted.
+
+    Args:
+        poses: (n, 7) poses of the blocks, x y z [m] and wxyz.
+        base: (7,) pose of the lowest goal.
+
+    Raises:
+        BadOption: a pose is refused.
+    """
     for k, pose in enumerate(poses):
         if np.abs(pose[:2]).max() > TABLE_EDGE or pose[2] < TABLE_HEIGHT + 0.4 * BLOCK_SIZE[2]:
             raise BadOption("object_poses", f"block {k} at {np.round(pose[:3], 3).tolist()} is not on the table")

@@ -1,4 +1,4 @@
-"""Where things stand at the start of an episode: levels as data, seeded layouts as pure functions."""
+"""Start layouts of stacking: levels as data, seeded layouts as pure functions."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 from ...planner.errors import BadOption
 
 BASE_PLACE = (0.10, 0.0)
-"""Nominal place [m] of the stack on the table."""
+"""Nominal position x, y [m] of the stack on the table."""
 SPACING, ROW_X = 0.22, (-0.08, -0.22)
-"""Distance of blocks in a row and x of the first and second row [m]; three blocks fill a row."""
+"""Distance of blocks in a row, and x of the first and second row [m]; three blocks fill a row."""
 BLOCK_GAP, BASE_GAP = 0.12, 0.17
 """Least distance of block centers to each other and to the base place [m]."""
 REACH = (0.32, 0.70)
-"""Distance of blocks from the arm's base axis [m]: what a Panda reaches with a level hand."""
+"""Range of the blocks' distance from the arm's base axis [m]: a Panda reaches it with its hand pointing down."""
 TABLE_EDGE = 0.36
 """Largest |x| and |y| of a block's center on the table [m]."""
 LONG_GAP = 0.30
-"""Of blocks to the base place where there are obstacles [m]: a shorter way has no room for one beside a hand."""
+"""Least distance of blocks to the base place with obstacles [m]: a shorter path leaves no clearance for one."""
 MAX_TRIES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class StackRanges:
-    """How far a layout may differ from the nominal one.
+    """Largest deviations of a layout from the nominal one.
 
     Attributes:
         block: largest shift of a block in x and in y [m].
@@ -45,16 +45,16 @@ RANGES = {
     "L1": StackRanges(0.10, 0.05, np.deg2rad(30.0), 0.05),
     "L2": StackRanges(0.20, 0.10, np.deg2rad(120.0), 0.15),
 }
-"""By the name of a layout, see `levels`."""
+"""Ranges by layout name, see `levels`."""
 
 
 @dataclass(frozen=True, slots=True)
 class StackLayout:
-    """A start.
+    """Layout of a start.
 
     Attributes:
-        blocks: (n, 3) x, y [m] and yaw [rad].
-        base: (3,) x, y [m] and yaw [rad] of the place of the stack.
+        blocks: (n, 3) x, y [m] and yaw [rad] of the blocks.
+        base: (3,) x, y [m] and yaw [rad] of the base place.
         joints: (n_arms, dof) offsets from the home joints [rad].
     """
 
@@ -64,7 +64,7 @@ class StackLayout:
 
 
 def nominal_blocks(count: int) -> np.ndarray:
-    """(count, 2) places of the blocks at level L0 [m]."""
+    """Return the positions (count, 2) [m] of the blocks at level L0."""
     order = (-1.0, 0.0, 1.0)
     return np.array([[ROW_X[k // 3], SPACING * order[k % 3]] for k in range(count)])
 
@@ -78,11 +78,11 @@ def stack_layout(
     base_gap: float = BASE_GAP,
     reach: tuple[float, float] = REACH,
 ) -> StackLayout:
-    """A layout of blocks and base place by rejection: independent of any method.
+    """Draw a layout of blocks and base place by rejection, independent of any method.
 
     Args:
         rng: source of randomness.
-        ranges: how far it may differ from the nominal one.
+        ranges: largest deviations from the nominal layout.
         count: number of blocks.
         arm_axis: (2,) x, y of the arm's base axis [m].
         joints: shape (n_arms, dof) of the start joints.
@@ -90,7 +90,7 @@ def stack_layout(
         reach: least and largest distance of the blocks from the arm's axis [m].
 
     Raises:
-        BadOption: no layout was found in a bounded number of tries.
+        BadOption: no layout was found in `MAX_TRIES` tries.
     """
     offsets = rng.uniform(-ranges.joints, ranges.joints, joints)
     nominal = nominal_blocks(count)
@@ -111,7 +111,15 @@ def fits(
     base_gap: float = BASE_GAP,
     reach: tuple[float, float] = REACH,
 ) -> bool:
-    """The blocks (n, 2) keep their distances to each other, to the base place (2,) and to the arm's axis."""
+    """Return whether blocks keep their distances to each other, to the base place and to the arm's axis.
+
+    Args:
+        places: (n, 2) positions of the blocks [m].
+        base: (2,) position of the base place [m].
+        arm_axis: (2,) x, y of the arm's base axis [m].
+        base_gap: least distance of the blocks to the base place [m].
+        reach: least and largest distance of the blocks from the arm's axis [m].
+    """
     away = np.linalg.norm(places - arm_axis, axis=1)
     between = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
     return bool(

@@ -10,9 +10,9 @@ from ...planner.errors import BadOption
 from ..core.dense_reward import closeness, placing
 from ..core.environment import checked_choice
 from ..core.grasped_start import SQUEEZE, holding_joints
-from ..core.obstacle_placement import PlacementMotion
+from ..core.placement_context import PlacementMotion
 from ..core.reset_options import checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SubTask, gaps
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
 from ..core.spaces import REACH
 from ..simulation.simulation import Start
 from ..simulation.state import State
@@ -22,17 +22,17 @@ from .stack_env import StackEnv
 
 ONTO = ("table", "block")
 HELD = {"L0": (0.12, 0.12), "L1": (0.08, 0.16), "L2": (0.06, 0.20)}
-"""Range of the held block's height above the table [m], by the name of a layout."""
+"""Range of the held block's height above the table [m], by layout name."""
 UP = 0.008
-"""Of the hand above the middle of a block that it holds from the start [m]: people take blocks by the upper half."""
+"""Height of the hand above the center of a block held from the start [m]: people grasp blocks by the upper half."""
 MAX_STARTS = 200
 
 
 class PlaceProgress(StackProgress):
-    """Of the last block, which may be in the hand from the start."""
+    """Progress of placing the last block, which may be in the hand from the start."""
 
     def reward(self, state: State) -> float:
-        """The dense reward of the state taken in last."""
+        """See `Progress`."""
         pose, goal, tcp = state.object_pose[-1], self._goals[-1], state.tcp_pose[0]
         distance, angle = gaps(pose, goal, half_turns=True)
         reach = float(np.linalg.norm(pose[:3] - tcp[:3]))
@@ -40,14 +40,14 @@ class PlaceProgress(StackProgress):
         return float(placing(reach, float(distance), float(angle), self.held, self.placed == self.n_blocks, away))
 
 
-class PlaceOneEnv(SubTask[StackProgress], StackEnv):
-    """Put the block in the hand onto its place, on the table or on another block.
+class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
+    """Put the block in the hand at its goal, on the table or on another block.
 
     ## Description
-    A wooden block (60 x 40 x 50 mm, 72 g) is in the hand, held by friction between the fingers only. It must be put at
-    its place, let go, and the hand withdrawn by 5 cm. Success is judged from the simulator as in `onedemo/Stack-v0`:
-    within 10 mm in the plane, 10 degrees of yaw (a block looks the same after half a turn) and 5 mm in height, touched
-    by no finger, standing still, for half a second.
+    A wooden block (60 x 40 x 50 mm, 72 g) is in the hand, held only by friction between the fingers. It must be put at
+    its goal and released, and the hand withdrawn by 5 cm. Success is judged from the simulator as in
+    `onedemo/Stack-v0`: for half a second the block is within 10 mm horizontally, 10 degrees of yaw (a block looks the
+    same after half a turn) and 5 mm in height of its goal, touched by no finger and at rest.
 
     ## Action Space
     `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
@@ -57,7 +57,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
@@ -66,31 +66,31 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     |---|---|---|
     | `joint_positions` | (1, 7) | [rad] |
     | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
     | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n, 7) | the block that stands there already with `onto="block"`, then the one to place |
-    | `goal_pose` | (n, 7) | where each block must end; constant during an episode |
+    | `object_pose` | (n, 7) | with `onto="block"` the block already in place, then the one to place |
+    | `goal_pose` | (n, 7) | goal of each block; constant during an episode |
     | `motion_index` | (1,) | 2k while block k is to be fetched, 2k + 1 while it is held, 2n when all are placed |
-    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
     | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | the obstacles |
-    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
-    | `last_action` | that of the action | what was done last; zeros at the start |
+    | `obstacle_pose` | (3, 7) | poses of the obstacles |
+    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
+    | `last_action` | that of the action | last action; zeros at the start |
 
-    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
-    `achieved_goal` and `desired_goal`
-    (8,): the block's pose, and 1 if it is let go and the hand is 5 cm away, else 0; its place and 1.
-    `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
+    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
+    vector), `achieved_goal` and `desired_goal`
+    (8,): pose of the block, and 1 once it is released and the hand is 5 cm away, else 0; its goal and 1.
+    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
 
     ## Rewards
-    `reward="dense"` (default): in [0, 1]: up to 0.75 for bringing the held block to its place, from 0.75 to 1 for
+    `reward="dense"` (default): in [0, 1]: up to 0.75 for bringing the held block to its goal, from 0.75 to 1 for
     withdrawing once it stands there. `reward="sparse"`: 1 with success, else 0.
 
     ## Starting State
-    By `level`: L0 the nominal place; L1 the block moved by up to 10 cm and turned by up to 30 degrees, its place by up
+    By `level`: L0 the nominal place; L1 the block moved by up to 10 cm and turned by up to 30 degrees, its goal by up
     to 5 cm and 30 degrees, held 8 to 16 cm above the table; L2 up to 20 cm, 10 cm, 120 degrees, 6 to 20 cm. L3, L4 and
-    F are L2 with obstacles on the block's way, see `onedemo/Stack-v0`. R, S and T start as L1 does. With
+    F are L2 with obstacles on the block's path, see `onedemo/Stack-v0`. R, S and T start as L1 does. With
     `pregrasped=False` the block stands on the table and the hand is at its ready posture; give `max_episode_steps=300`.
 
     ## Episode End
@@ -98,7 +98,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
     `control_frequency`). A settled success ends the episode with
     `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form it goes on.
+    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
 
     ## Info
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
@@ -107,11 +107,11 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
 
     ## Arguments
     `robot="Panda"` (Baxter and every robot of `onedemo/Stack-v0`), `onto="table" | "block"`, `pregrasped=True`,
-    `level="L1"`, `obstacles=None` (what the level says) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
+    `level="L1"`, `obstacles=None` (those of the level) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
     "forearm"`, `control_mode="ee_twist" | "joint_velocity"`, `reward="dense" | "sparse"`, `control_frequency=20` (10,
     20, 25 or 50: any that divides 500), `goal_form=False`, `end_on_success=None`, `render_mode=None | "rgb_array" |
     "human"`, `arm=None`. `reset(options=...)` takes `level`, `obstacles`, `object_poses` (n, 7; of the held block
-    where it is held), `base_pose` (7,) of the lowest goal, and `joint_positions` (7,), which a block in the hand
+    in the hand), `base_pose` (7,) of the lowest goal, and `joint_positions` (7,), which a block in the hand
     follows.
 
     ## Version History
@@ -153,7 +153,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
         self._take_form("place_one", goal_form, end_on_success)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        """That of stacking, the lower block at its place, the other one in the hand."""
+        """Return a start as in stacking, with the lower block at its place and the other one in the hand."""
         for _ in range(MAX_STARTS):
             start = super()._start(options, layout, spacious)
             poses, grips, joints = start.objects.copy(), None, start.joints
@@ -171,7 +171,7 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
     def _in_hand(
         self, options: dict[str, Any], layout: str, poses: np.ndarray, joints: np.ndarray
     ) -> np.ndarray | None:
-        """Joints (1, dof) that hold the last of the blocks (n, 7), whose pose is changed; None: nothing does."""
+        """Return joints (1, dof) that hold the last of the blocks (n, 7), updating its pose; None if no joints do."""
         arm = self.arms[0]
         if "joint_positions" in options:
             hand = arm.fk(checked_joints(options["joint_positions"], self.arms)[0])
@@ -189,17 +189,17 @@ class PlaceOneEnv(SubTask[StackProgress], StackEnv):
         return super()._placement_motions(start)[-1:]
 
     def achieved_goal(self, state: State) -> np.ndarray:
-        """(8,) the block, and whether it is let go."""
+        """See `SingleMotionEnv`: (8,) pose of the block, and 1 once it is released and the hand is away, else 0."""
         pose = state.object_pose[-1]
         away = float(np.linalg.norm(pose[:3] - state.tcp_pose[0, :3])) >= WITHDRAWN
         return np.append(pose, float(away and not self._progress.held))
 
     def desired_goal(self) -> np.ndarray:
-        """(8,) its place, and 1: let go."""
+        """See `SingleMotionEnv`: (8,) place of the block, and 1 for released."""
         return np.append(self._goal_pose[-1], 1.0)
 
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
-        """How well poses of the block agree, half turns apart, and whether it is let go in both or in none."""
+        """See `SingleMotionEnv`: poses of the block up to half turns, released in both goals or in neither."""
         distance, angle = gaps(achieved, desired, half_turns=True)
         away = np.abs(achieved - desired)
         aside = np.hypot(away[..., 0], away[..., 1])

@@ -1,4 +1,4 @@
-"""Reaching: the hand is brought above a block."""
+"""Reaching: bringing the hand above a block."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box, Sphere
+from ...planner import Box, Pose, Sphere
+from ...planner.robot.kinematics import CHAIN
 from ..core.dense_reward import closeness
-from ..core.obstacle_placement import PlacementMotion
+from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SubTask, gaps
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
 from ..core.spaces import REACH
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
@@ -25,16 +25,16 @@ from .rules import BLOCK_SIZE
 
 OPTIONS = ("level", "obstacles", "object_poses", "joint_positions")
 HEIGHT = 0.08
-"""Of the hand's place above the block's center [m]: the fingertips are clear of it."""
+"""Height of the hand's goal above the block's center [m]: the fingertips are clear of the block."""
 
 
-class ReachEnv(SubTask[ReachProgress]):
+class ReachEnv(SingleMotionEnv[ReachProgress]):
     """Bring the open hand above a block, ready to grasp it.
 
     ## Description
-    A wooden block (60 x 40 x 50 mm) lies on a table. The hand's place is 8 cm above the block's middle, pointing
-    straight down, the fingers on both sides of its narrow axis; half a turn of the hand makes no difference. Success
-    is judged from the simulator: within 10 mm and 10 degrees of the place for half a second.
+    A wooden block (60 x 40 x 50 mm) lies on a table. The hand's goal is 8 cm above the block's center, pointing
+    straight down, with the fingers on both sides of its narrow axis; half a turn of the hand makes no difference.
+    Success is judged from the simulator: the hand stays within 10 mm and 10 degrees of its goal for half a second.
 
     ## Action Space
     `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
@@ -44,7 +44,7 @@ class ReachEnv(SubTask[ReachProgress]):
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
@@ -53,38 +53,38 @@ class ReachEnv(SubTask[ReachProgress]):
     |---|---|---|
     | `joint_positions` | (1, 7) | [rad] |
     | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
     | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (1, 7) | the block |
-    | `goal_pose` | (1, 7) | where the tcp must be; constant during an episode |
-    | `motion_index` | (1,) | 1 while the hand is at its place, else 0 |
-    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `object_pose` | (1, 7) | pose of the block |
+    | `goal_pose` | (1, 7) | goal of the tcp; constant during an episode |
+    | `motion_index` | (1,) | 1 while the hand is at its goal, else 0 |
+    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
     | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | the obstacles |
-    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
-    | `last_action` | that of the action | what was done last; zeros at the start |
+    | `obstacle_pose` | (3, 7) | poses of the obstacles |
+    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
+    | `last_action` | that of the action | last action; zeros at the start |
 
-    With `goal_form=True` it is `observation` (all of the above but `goal_pose` and `motion_index` in one vector),
-    `achieved_goal` and `desired_goal`
-    (7,): the tcp's pose and its place; `reward="sparse"` is 1 within the tolerances.
-    `compute_reward(achieved, desired, info)` takes one or many. Stable-Baselines3's HER works with it.
+    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
+    vector), `achieved_goal` and `desired_goal`
+    (7,): pose and goal of the tcp; `reward="sparse"` is 1 within the tolerances.
+    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
 
     ## Rewards
-    `reward="dense"` (default): in [0, 1], how close the hand is to its place, 1 once it has been there for half a
+    `reward="dense"` (default): in [0, 1], closeness of the hand to its goal, 1 once it has been there for half a
     second. `reward="sparse"`: 1 with success, else 0.
 
     ## Starting State
     By `level`: L0 the nominal place; L1 the block moved by up to 10 cm and turned by up to 30 degrees, start joints by
-    up to 0.05 rad; L2 up to 20 cm, 120 degrees and 0.15 rad. L3, L4 and F are L2 with obstacles on the hand's way, see
+    up to 0.05 rad; L2 up to 20 cm, 120 degrees and 0.15 rad. L3, L4 and F are L2 with obstacles on the hand's path, see
     `onedemo/Stack-v0`. R, S and T start as L1 does.
 
     ## Episode End
-    `terminated` never: nothing that is done makes success impossible.
+    `terminated` never: the task can always succeed.
     `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
     `control_frequency`). A settled success ends the episode with
     `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form it goes on.
+    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
 
     ## Info
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
@@ -92,8 +92,8 @@ class ReachEnv(SubTask[ReachProgress]):
     [m], `angle_error` [rad].
 
     ## Arguments
-    `robot="Panda"` (Baxter and every robot of `onedemo/Stack-v0`), `level="L1"`, `obstacles=None` (what the level
-    says) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm"`, `control_mode="ee_twist" |
+    `robot="Panda"` (Baxter and every robot of `onedemo/Stack-v0`), `level="L1"`, `obstacles=None` (those of the
+    level) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm"`, `control_mode="ee_twist" |
     "joint_velocity"`, `reward="dense" | "sparse"`, `control_frequency=20` (10, 20, 25 or 50: any that divides 500),
     `goal_form=False`, `end_on_success=None`, `render_mode=None | "rgb_array" | "human"`, `arm=None`.
     `reset(options=...)` takes `level`, `obstacles`, `object_poses` (1, 7) and `joint_positions` (7,).
@@ -120,7 +120,7 @@ class ReachEnv(SubTask[ReachProgress]):
         kind = robot_named(robot)
         super().__init__(
             name="reach",
-            robot=robot,
+            robot=kind,
             things=SceneSpec((FreeBody("block0", Box(BLOCK_SIZE), "WoodLight"),)),
             goals=1,
             motions=1,
@@ -130,7 +130,7 @@ class ReachEnv(SubTask[ReachProgress]):
             reward=reward,
             render_mode=render_mode,
             control_frequency=control_frequency,
-            arms=kind.checked_arms(arm, robot),
+            arms=kind.checked_arms(arm),
         )
         self._reach = kind.reach
         self._goal_pose = np.zeros((1, 7))
@@ -138,7 +138,7 @@ class ReachEnv(SubTask[ReachProgress]):
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
-        home, axis = self.sim.scene.home, self.arms[0].chain[0, 4:6]
+        home, axis = self.sim.scene.home, self.arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
         drawn = stack_layout(self.np_random, RANGES[layout], 1, axis, home.shape, gap, self._reach)
         poses, base = block_poses(drawn)
@@ -154,7 +154,7 @@ class ReachEnv(SubTask[ReachProgress]):
         return Start(joints, poses)
 
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """From the start to above the block."""
+        """Return the motion from the start to above the block."""
         goals = tuple(above(grasp, HEIGHT) for grasp in block_grasps(start.objects[0]))
         fingertip = Sphere(0.005)
         return [
@@ -165,14 +165,14 @@ class ReachEnv(SubTask[ReachProgress]):
         return [Ghost(pose, Sphere(0.012)) for pose in self._goal_pose]
 
     def achieved_goal(self, state: State) -> np.ndarray:
-        """(7,) the tcp."""
+        """See `SingleMotionEnv`: (7,) pose of the tcp."""
         return state.tcp_pose[0].copy()
 
     def desired_goal(self) -> np.ndarray:
-        """(7,) its place."""
+        """See `SingleMotionEnv`: (7,) goal pose of the tcp."""
         return self._goal_pose[0].copy()
 
     def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
-        """How well poses of the tcp agree, half turns of the hand apart."""
+        """See `SingleMotionEnv`: poses of the tcp up to half turns of the hand."""
         distance, angle = gaps(achieved, desired, half_turns=True)
         return Agreement(closeness(distance, angle), (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE))

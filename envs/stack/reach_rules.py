@@ -1,4 +1,4 @@
-"""The rules of reaching: how near the hand is to its place, wanted contacts, dense reward."""
+"""Rules of reaching: distance of the hand from its goal, wanted contacts, dense reward."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, 
 from ..simulation.state import State
 
 MAX_OFFSET, MAX_ANGLE = 0.010, float(np.deg2rad(10.0))
-"""The hand is at its place within these [m, rad]."""
+"""Tolerances of the hand at its goal [m, rad]."""
 
 
 class ReachVerdict(NamedTuple):
-    """See `progress.Contacts`."""
+    """Unwanted contacts of a state, see `progress.Contacts`."""
 
     unwanted: int
     low: int
@@ -28,7 +28,7 @@ class ReachVerdict(NamedTuple):
 
 @kernel
 def unwanted_contacts(touching):
-    """How many pairs of owners touch that should not, and the last of them: only the block on the table may."""
+    """Return the number of unwanted contacts and the owners in the last one; only block and table may touch."""
     count, low, high = 0, -1, -1
     for a in range(len(touching)):
         for b in range(a, len(touching)):
@@ -39,11 +39,11 @@ def unwanted_contacts(touching):
 
 
 class ReachProgress(Progress):
-    """What has happened in an episode so far.
+    """Progress of reaching, updated from the simulator's state at each step.
 
     Args:
-        goals: (2, 8) dual quaternions of the hand at its place: it looks the same after half a turn.
-        dt: seconds between states.
+        goals: (2, 8) dual quaternions of the hand at its goal, half a turn apart.
+        dt: time between states [s].
     """
 
     def __init__(self, goals: np.ndarray, dt: float):
@@ -53,22 +53,22 @@ class ReachProgress(Progress):
 
     @property
     def failed(self) -> bool:
-        """Never."""
+        """False: the task can always succeed."""
         return False
 
     @property
     def motion_index(self) -> float:
-        """1 while the hand is at its place."""
+        """Index of the current motion: 1 while the hand is at its goal, else 0."""
         return float(self._there)
 
     @property
     def stage(self) -> str:
-        """The furthest progress in words."""
+        """Furthest progress in words."""
         return "at the place" if self.success else "start"
 
     @property
     def failure(self) -> str:
-        """Nothing that is done makes it impossible."""
+        """Empty string: the task can always succeed."""
         return ""
 
     @property
@@ -76,7 +76,7 @@ class ReachProgress(Progress):
         return self.distance <= MAX_OFFSET and self.angle <= MAX_ANGLE
 
     def update(self, state: State) -> ReachVerdict:
-        """Take in a new state."""
+        """See `Progress`."""
         here = tuple(float(v) for v in Pose.from_vector(state.tcp_pose[0]).dq)
         self.distance, self.angle = min(
             (screw.pose_distance(here, goal) for goal in self._goals), key=lambda gap: gap[1]
@@ -86,9 +86,9 @@ class ReachProgress(Progress):
         return verdict
 
     def reward(self, state: State) -> float:
-        """The dense reward of the state taken in last."""
+        """See `Progress`."""
         return 1.0 if self.success else float(closeness(self.distance, self.angle))
 
     def task_info(self) -> dict[str, Any]:
-        """The task's own entries of `info`."""
+        """See `Progress`."""
         return {"position_error": self.distance, "angle_error": self.angle}

@@ -1,6 +1,6 @@
-"""The rules of stacking: progress, success, wanted contacts, dense reward, from the simulator's state only.
+"""Rules of stacking: progress, success, wanted contacts, dense reward, from the simulator's state only.
 
-The numbers are judged in compiled code, see `state`; `StackProgress` keeps what they came to.
+Compiled code judges the numbers, see `state`; `StackProgress` keeps the results.
 """
 
 from __future__ import annotations
@@ -18,38 +18,44 @@ from ..simulation.state import State
 
 BLOCK_SIZE = (0.06, 0.04, 0.05)
 BLOCK = 0.04
-"""Blocks whose centers are nearer than this in the plane are inside each other [m]."""
+"""Width of a block between the fingers; blocks whose centers are horizontally nearer than this overlap [m]."""
 MAX_OFFSET, MAX_YAW, MAX_HEIGHT = 0.010, np.deg2rad(10.0), 0.005
-"""A block is in place within these [m, rad, m]."""
+"""Tolerances of a block at its goal: horizontal distance [m], yaw [rad], height [m]."""
 STILL = 0.01
-"""A block slower than this stands [m/s]."""
+"""Speed below which a block counts as at rest [m/s]."""
 WITHDRAWN = 0.05
-"""Distance of the tcp to every block's center from which on the hand has withdrawn [m]."""
+"""Distance of the tcp to every block's center from which the hand counts as withdrawn [m]."""
 LOST = 0.02
-"""A block that was lifted and now stands farther than this from its place was dropped [m]."""
+"""Horizontal distance from its goal beyond which a block that was lifted and is at rest was dropped [m]."""
 LOWEST = TABLE_HEIGHT - 0.05
-"""A block whose center is below this has fallen off the table [m]."""
+"""Height (z) of a block's center below which the block has fallen off the table [m]."""
 LIFTED = 0.02
-"""Height above its start at which a block counts as lifted [m]."""
+"""Height above its start from which a block counts as lifted [m]."""
 
 
-FIRST, WAS_LIFTED = 0, 1
-"""Rows of the memory: height of each block at the start, and 1 once it was lifted."""
+class MemoryRows(NamedTuple):
+    """Rows of the numbers that the judge of stacking remembers, one column per block."""
+
+    height: int = 0  # initial height of the block [m]
+    was_lifted: int = 1  # 1 once the block was lifted
+
+
+MEMORY = MemoryRows()
 
 
 class StackVerdict(NamedTuple):
-    """What the compiled judge says of a state; counts and flags as whole numbers.
+    """Verdict of the compiled judge on a state; counts and flags are whole numbers.
 
     Attributes:
-        placed: blocks in place, from the lowest on.
-        held: the next block is in the hand.
-        raised: and is lifted.
-        settled: all blocks are in place and at rest, and the hand has withdrawn.
-        lost: a block that was lifted stands elsewhere.
-        fallen: a block is off the table.
-        unwanted: pairs that touch and should not.
-        low: the smaller owner of the last of them, or -1.
-        high: the other owner.
+        placed: number of blocks in place, counted from the lowest.
+        held: whether the next block is in the hand.
+        raised: whether the held block is lifted.
+        settled: whether all blocks are in place and at rest, and the hand has withdrawn.
+        lost: whether a block was lifted and now rests elsewhere.
+        fallen: whether a block is off the table.
+        unwanted: number of pairs in unwanted contact.
+        low: smaller owner of the last such pair, or -1.
+        high: larger owner of the last such pair, or -1.
     """
 
     placed: int
@@ -65,17 +71,27 @@ class StackVerdict(NamedTuple):
 
 @kernel
 def yaw_error(pose, goal):
-    """Yaw between two poses (7,) [rad], half turns not counted, in [0, pi / 2]."""
+    """Return the yaw between two poses [rad], half turns ignored, in [0, pi / 2].
+
+    Args:
+        pose: (7,) pose of a block, x y z [m] and wxyz.
+        goal: (7,) its goal.
+    """
     turn = 2.0 * (math.atan2(pose[6], pose[3]) - math.atan2(goal[6], goal[3])) % math.pi
     return min(turn, math.pi - turn)
 
 
 @kernel
 def allowed_contact(low, high, placed):
-    """Whether two owners may touch: see WORLD in `scene` for their numbers, the smaller first.
+    """Return whether two owners may touch.
 
-    Wanted are blocks on the table, a block on the next lower one of the stack, and the fingers on the block that
-    is being fetched, held or was let go last. A robot's contact with itself says nothing.
+    Wanted contacts are blocks on the table, a block on the next lower one of the stack, and the fingers on the block
+    that is being fetched, is held or was released last. A robot's contacts with itself are ignored.
+
+    Args:
+        low: smaller owner, see `WORLD` in `scene`.
+        high: larger owner.
+        placed: number of blocks in place.
     """
     if low == high or (low == ARM and high == FINGERS) or (low == OTHER_ARM and high == OTHER_FINGERS):
         return True
@@ -91,22 +107,22 @@ def allowed_contact(low, high, placed):
 
 @kernel
 def _distance(a, b):
-    """Of two points (3,) [m]."""
+    """Return the distance of two points (3,) [m]."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @kernel
 def judge_state(poses, velocities, tcp, touching, goals, memory, errors):
-    """Judge a state: the entries of a `StackVerdict`.
+    """Judge a state; return the entries of a `StackVerdict`.
 
     Args:
-        poses: (n, 7) blocks.
-        velocities: (n, 3) of the blocks [m/s].
-        tcp: (n_arms, 7) the tools.
-        touching: (owners, owners) who touches whom, see `State`.
-        goals: (n, 7) where the blocks must end.
-        memory: (2, n) see FIRST; renewed.
-        errors: (2, n) result: distance in the plane [m] and yaw [rad] of each block to its place.
+        poses: (n, 7) poses of the blocks, x y z [m] and wxyz.
+        velocities: (n, 3) velocities of the blocks [m/s].
+        tcp: (n_arms, 7) tcp poses.
+        touching: (owners, owners) contacts, see `State`.
+        goals: (n, 7) goals of the blocks.
+        memory: (2, n) see `MEMORY`; updated.
+        errors: (2, n) result: horizontal distance [m] and yaw [rad] of each block to its goal.
     """
     n, placed, counting, quiet, lost, fallen = len(poses), 0, True, True, False, False
     for k in range(n):
@@ -120,12 +136,12 @@ def judge_state(poses, velocities, tcp, touching, goals, memory, errors):
         placed += counting
         still = math.sqrt(velocities[k, 0] ** 2 + velocities[k, 1] ** 2 + velocities[k, 2] ** 2) < STILL
         quiet = quiet and still and _distance(pose, tcp[0]) >= WITHDRAWN
-        if in_hand and pose[2] > memory[FIRST, k] + LIFTED:
-            memory[WAS_LIFTED, k] = 1.0
-        lost |= memory[WAS_LIFTED, k] != 0.0 and still and not in_hand and not in_place and offset > LOST
+        if in_hand and pose[2] > memory[MEMORY.height, k] + LIFTED:
+            memory[MEMORY.was_lifted, k] = 1.0
+        lost |= memory[MEMORY.was_lifted, k] != 0.0 and still and not in_hand and not in_place and offset > LOST
         fallen |= pose[2] < LOWEST
     held = placed < n and touching[FINGERS, FIRST_OBJECT + placed] != 0.0
-    raised = held and poses[placed, 2] > memory[FIRST, placed] + LIFTED
+    raised = held and poses[placed, 2] > memory[MEMORY.height, placed] + LIFTED
     unwanted, low, high = 0, -1, -1
     for a in range(len(touching)):
         for b in range(a, len(touching)):
@@ -136,7 +152,15 @@ def judge_state(poses, velocities, tcp, touching, goals, memory, errors):
 
 @kernel
 def shaped(poses, goals, tcp, placed, held):
-    """Dense reward in [0, 1]: the share of blocks placed, and of the current one reached, grasped and carried."""
+    """Return the dense reward in [0, 1]: share of blocks placed, and of the current one reached, grasped and carried.
+
+    Args:
+        poses: (n, 7) poses of the blocks, x y z [m] and wxyz.
+        goals: (n, 7) goals of the blocks.
+        tcp: (n_arms, 7) tcp poses.
+        placed: number of blocks in place.
+        held: whether the next block is in the hand.
+    """
     n = len(poses)
     if placed == n:
         return 1.0
@@ -147,13 +171,13 @@ def shaped(poses, goals, tcp, placed, held):
 
 
 class StackProgress(Progress):
-    """What has happened in an episode so far, renewed from the simulator's state at each step.
+    """Progress of stacking, updated from the simulator's state at each step.
 
     Args:
-        goals: (n, 7) where the blocks must end.
-        start: (n, 7) where they are, or stood, at the start.
-        dt: seconds between states.
-        in_hand: the last one is in the hand from the start.
+        goals: (n, 7) goals of the blocks, x y z [m] and wxyz.
+        start: (n, 7) poses at the start; of a block in the hand its pose on the table.
+        dt: time between states [s].
+        in_hand: whether the last block is in the hand from the start.
     """
 
     def __init__(self, goals: np.ndarray, start: np.ndarray, dt: float, *, in_hand: bool = False):
@@ -161,7 +185,7 @@ class StackProgress(Progress):
         self.n_blocks = len(goals)
         self._goals = goals
         self._memory = np.stack([start[:, 2], np.zeros(self.n_blocks)])
-        self._memory[WAS_LIFTED, -1] = float(in_hand)
+        self._memory[MEMORY.was_lifted, -1] = float(in_hand)
         self._errors = np.zeros((2, self.n_blocks))
         self._best_stage = 0
         self._stages = [stage_name(best, self.n_blocks) for best in range(2 * self.n_blocks + 1)]
@@ -171,26 +195,26 @@ class StackProgress(Progress):
 
     @property
     def motion_index(self) -> float:
-        """2k while block k is to be fetched, 2k + 1 while it is held."""
+        """Index of the current motion: 2k while fetching block k, 2k + 1 while holding it."""
         return float(2 * self.placed + self.held)
 
     @property
     def failed(self) -> bool:
-        """A block is off the table."""
+        """True once a block is off the table."""
         return self._failure == "off_table"
 
     @property
     def stage(self) -> str:
-        """The furthest progress in words."""
+        """Furthest progress in words."""
         return self._stages[self._best_stage]
 
     @property
     def failure(self) -> str:
-        """Why it cannot succeed as things are, "" if it can."""
+        """Reason why the task cannot succeed at present, "" if it can."""
         return self._failure
 
     def update(self, state: State) -> StackVerdict:
-        """Take in a new state."""
+        """See `Progress`."""
         self._errors = np.empty((2, self.n_blocks))
         poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
         verdict = StackVerdict(
@@ -203,16 +227,21 @@ class StackProgress(Progress):
         return verdict
 
     def reward(self, state: State) -> float:
-        """The dense reward of the state taken in last."""
+        """See `Progress`."""
         return shaped(state.object_pose, self._goals, state.tcp_pose, self.placed, self.held)
 
     def task_info(self) -> dict[str, Any]:
-        """The task's own entries of `info`."""
+        """See `Progress`."""
         return {"blocks_placed": self.placed, "position_error": self._errors[0], "yaw_error": self._errors[1]}
 
 
 def stage_name(best: int, n_blocks: int) -> str:
-    """The furthest progress in words."""
+    """Return the furthest progress in words.
+
+    Args:
+        best: 2 for each block placed, plus 1 if the next one was lifted.
+        n_blocks: number of blocks.
+    """
     if best == 0:
         return "start"
     if best % 2:

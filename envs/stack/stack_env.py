@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...planner import Box, Pose
 from ...planner.errors import BadOption
-from ...planner.geometry.pose import Pose
-from ...planner.geometry.shapes import Box
-from ..core.environment import OneDemoEnv
-from ..core.obstacle_placement import ObstacleRequest, PlacementMotion
+from ...planner.robot.kinematics import CHAIN
+from ..core.environment import TaskEnv
+from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
@@ -23,21 +23,21 @@ from .rules import BLOCK, BLOCK_SIZE, StackProgress
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
 OPTIONS = ("level", "obstacles", "object_poses", "base_pose", "joint_positions")
 RAISED = 0.10
-"""Height [m] of the hand above a grasp or a place at the ends of a leg."""
+"""Height [m] of the hand above a grasp or a goal at the ends of a carry."""
 ABOVE = (0.0, 0.04, 0.08)
-"""Heights [m] above grasps and places at which the hand must find room beside obstacles."""
+"""Heights [m] above grasps and goals at which the hand must have clearance from obstacles."""
 PAPER_SPEED = 0.1
-"""Of the obstacle that swings in front of the last block [m/s]."""
+"""Peak speed of the obstacle that swings in front of the last block [m/s]."""
 
 
-class StackEnv(OneDemoEnv[StackProgress]):
+class StackEnv(TaskEnv[StackProgress]):
     """Stack wooden blocks at a given place, in order, with one arm.
 
     ## Description
     Wooden blocks (60 x 40 x 50 mm, 72 g) lie on a table. Block 0 must be put at the base place, block 1 onto it,
-    and so on. They are held by friction between the fingers only. Success is judged from the simulator: every
-    block within 10 mm in the plane, 10 degrees of yaw (a block looks the same after half a turn) and 5 mm in height
-    of its place, touched by no finger, standing still, the hand withdrawn by 5 cm, for half a second.
+    and so on. Only friction holds them between the fingers. Success is judged from the simulator: for half a second
+    every block is within 10 mm horizontally, 10 degrees of yaw (a block looks the same after half a turn) and 5 mm
+    in height of its goal, touched by no finger and at rest, and the hand has withdrawn by 5 cm.
 
     ## Action Space
     `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
@@ -47,7 +47,7 @@ class StackEnv(OneDemoEnv[StackProgress]):
     | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
     | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
     | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes, below 0 opens to that part of its width, 0 leaves it |
+    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
 
     ## Observation Space
     A `Dict` of float64 boxes; the first axis counts arms or blocks. Poses are `x y z [m]`, then quaternion wxyz.
@@ -56,31 +56,31 @@ class StackEnv(OneDemoEnv[StackProgress]):
     |---|---|---|
     | `joint_positions` | (1, 7) | [rad] |
     | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | the point between the finger pads; fingers close along its x, it points along its z |
+    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
     | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n, 7) | the blocks |
-    | `goal_pose` | (n, 7) | where each block must end; constant during an episode |
+    | `object_pose` | (n, 7) | poses of the blocks |
+    | `goal_pose` | (n, 7) | goal of each block; constant during an episode |
     | `motion_index` | (1,) | 2k while block k is to be fetched, 2k + 1 while it is held, 2n when all are placed |
-    | `obstacle_active` | (3,) | 1 where an obstacle is there; all entries of the others are 0 |
+    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
     | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
     | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | the obstacles |
-    | `obstacle_velocity` | (3, 3) | of their centers [m/s] |
+    | `obstacle_pose` | (3, 7) | poses of the obstacles |
+    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
 
     ## Rewards
-    `reward="dense"`: in [0, 1], the share of the task that is done, with reaching, grasping and carrying of the
-    current block in between. `reward="sparse"`: 1 with success, else 0.
+    `reward="dense"`: in [0, 1], the completed share of the task, including reaching, grasping and carrying of the
+    current block. `reward="sparse"`: 1 with success, else 0.
 
     ## Starting State
     By `level`: L0 the nominal row; L1 blocks moved by up to 10 cm and turned by up to 30 degrees, the base place by
     up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
-    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis (Baxter: 0.34 to 0.74 m):
+    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis (Baxter: 0.34 to 0.74 m),
     where its hand can point straight down.
 
-    L3, L4 and F are L2 with obstacles: L3 one to three still ones of 3 to 10 cm on the way of the hand, L4 one that
-    swings across it at up to 0.3 m/s or appears in the middle of a carry, F a still one where the forearm passes.
-    R, S and T start as L1 does. Obstacles are solid; they overlap what hand and block sweep on the straight way
-    and leave room at the start, at every grasp and at every place, whatever method is used.
+    L3, L4 and F are L2 with obstacles: L3 has one to three static ones of 3 to 10 cm on the hand's path, L4 one that
+    swings across the path at up to 0.3 m/s or appears during a carry, F a static one where the forearm passes.
+    R, S and T start as L1 does. Obstacles are solid. They overlap the volume that hand and block sweep on the
+    straight path, and leave clearance at the start, at every grasp and at every goal, for any method.
 
     ## Episode End
     `terminated` with a settled success, or when a block has fallen off the table. `truncated` after 60 s for three
@@ -89,14 +89,14 @@ class StackEnv(OneDemoEnv[StackProgress]):
     ## Info
     `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
     `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
-    what it holds), `layouts_refused` (starts that had no room for the obstacles), `blocks_placed`,
+    the held object), `layouts_refused` (starts that had no space for the obstacles), `blocks_placed`,
     `position_error` (n,) [m], `yaw_error` (n,) [rad].
 
     ## Arguments
-    `robot="Panda"`, `n_blocks=3` (1 to 6), `level="L1"`, `obstacles=None` (what the level says) or `"none" |
+    `robot="Panda"`, `n_blocks=3` (1 to 6), `level="L1"`, `obstacles=None` (those of the level) or `"none" |
     "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
     `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`,
-    `arm=None` (the robot's usual one; Baxter has "right" and "left", of which the other is parked).
+    `arm=None` (the robot's default arm; of Baxter's "right" and "left", the other one is parked).
     `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `ScheduledObstacle`), `object_poses` (n, 7),
     `base_pose` (7,) of the lowest block's goal, and `joint_positions` (7,).
 
@@ -119,11 +119,11 @@ class StackEnv(OneDemoEnv[StackProgress]):
         if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 1 <= n_blocks <= 6:
             raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 1 to 6")
         kind = robot_named(robot)
-        kind.check_grip(BLOCK, robot, "a block")
+        kind.check_grip(BLOCK, "a block")
         blocks = tuple(FreeBody(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
         super().__init__(
             name="stack",
-            robot=robot,
+            robot=kind,
             things=SceneSpec(blocks),
             goals=n_blocks,
             motions=2 * n_blocks,
@@ -133,7 +133,7 @@ class StackEnv(OneDemoEnv[StackProgress]):
             reward=reward,
             render_mode=render_mode,
             control_frequency=control_frequency,
-            arms=kind.checked_arms(arm, robot),
+            arms=kind.checked_arms(arm),
         )
         self.n_blocks, self._reach = n_blocks, kind.reach
         self._goal_pose = np.zeros((n_blocks, 7))
@@ -142,7 +142,7 @@ class StackEnv(OneDemoEnv[StackProgress]):
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
         home = self.sim.scene.home
-        axis = self.arms[0].chain[0, 4:6]
+        axis = self.arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
         drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap, self._reach)
         poses, base = block_poses(drawn)
@@ -160,7 +160,7 @@ class StackEnv(OneDemoEnv[StackProgress]):
         return Start(joints, poses)
 
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """The carries: from above a block to above its place."""
+        """Return the carries: from above a block to above its goal."""
         return [
             PlacementMotion(
                 start=above(block_grasps(block)[0], RAISED),
@@ -175,9 +175,9 @@ class StackEnv(OneDemoEnv[StackProgress]):
             for k, (block, goal) in enumerate(zip(start.objects, self._goal_pose, strict=True))
         ]
 
-    def _paper(self, legs: list[PlacementMotion]) -> list[ObstacleRequest]:
-        """One that swings in front of the last block."""
-        return [ObstacleRequest("moving", len(legs) - 1, PAPER_SPEED)]
+    def _paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
+        """Return an obstacle that swings in front of the last block."""
+        return [ObstacleRequest("moving", len(motions) - 1, PAPER_SPEED)]
 
     def _ghosts(self) -> list[Ghost]:
         return [Ghost(pose, Box(BLOCK_SIZE)) for pose in self._goal_pose]

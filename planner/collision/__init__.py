@@ -1,1 +1,1 @@
-"""Distance queries and proofs that a motion is clear."""
+"""Distance queries and certificates of clear motions."""

@@ -1,12 +1,12 @@
-"""Compiled certificates of a tool's motion between poses: nothing is sampled, every edge is proven clear or not.
+"""Compiled certificates of a tool's motion between poses: nothing is sampled, every edge is proven clear or refused.
 
-The tool is all that moves with the tcp: hand, fingers and what they hold, as capsules. In a work array (see
-`robot_arrays`) it is a robot without joints whose capsules all sit in frame 0.
+The tool is everything that moves with the tcp: hand, fingers and held objects, as capsules. Its packed array (see
+`robot_arrays`) is that of a robot without joints whose capsules all sit in frame 0.
 
-- A *slide* keeps the orientation. The distance of two convex bodies is then a convex function of the way, so the
-  plane that separates them at one place proves how far the next stretch is clear.
-- A *screw* turns as well. A point of the tool moves at a constant speed along it, so the room left at one place,
-  divided by that speed, proves the next stretch (conservative advancement).
+- A *slide* keeps the orientation. The distance of two convex bodies is then a convex function of the displacement, so
+  the plane that separates them at one place proves how far the next stretch is clear.
+- A *screw* turns as well. A point of the tool moves at a constant speed along it, so the slack at one place, divided
+  by that speed, proves the next stretch (conservative advancement).
 """
 
 from __future__ import annotations
@@ -15,72 +15,76 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..geometry import screw
-from ..geometry.shapes import Packed, pack
+from ..geometry.shapes import OBSTACLE, Packed, pack
 from ..jit import inlined, inner, kernel
-from .clearance import FIRST, GAP, KEEP, NORMAL, OTHER, all_beyond, find_near, min_slack, obstacle_distance
+from ..robot.kinematics import FRAME
+from .capsule_placement import end_a, end_b, may_touch, place_frames
+from .clearance import all_beyond, find_near, min_slack, obstacle_distance
 from .proximity import closest
-from .robot_arrays import (
-    B_A,
-    B_B,
-    B_RADIUS,
-    BODY,
-    FRAMES,
-    HEADER,
-    MARGIN,
-    N_CAPSULES,
-    N_NEAR,
-    N_OBSTACLES,
-    NEAR,
-    NEXT,
-    OBSTACLES,
-    W_REACH,
-    WORLD,
-    end_a,
-    end_b,
-    lay_capsules,
-    may_touch,
-    place_frames,
-    robot_arrays,
-    with_obstacles,
-)
+from .robot_arrays import CAPSULE, HEADER, NEAR_PAIR, PLACED, ROW, lay_capsules, robot_arrays, with_obstacles
 
 SMALLEST = 1e-4
-"""Way [m] below which a stretch that cannot be proven is held to be blocked."""
+"""Length [m] below which a stretch that cannot be proven counts as blocked."""
 
 
 def tool_arrays(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = (), margin: float = 0.0) -> np.ndarray:
-    """The work array of a tool among obstacles.
+    """Return the packed array of a tool among obstacles.
 
     Args:
         capsules: (m, 7), see `Body.tool`.
         packed: the obstacles.
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
-        margin: distance [m] to keep from obstacles without one of their own.
+        margin: distance [m] to keep from obstacles without a margin of their own.
     """
     work = robot_arrays((), (), pack(()))
-    work[HEADER, N_CAPSULES] = len(capsules)
-    lay_capsules(work[BODY : BODY + len(capsules)], capsules)
+    work[ROW.header, HEADER.capsules] = len(capsules)
+    lay_capsules(work[ROW.body : ROW.body + len(capsules)], capsules)
     return with_obstacles(work, packed, masks, margin)
+
+
+def pose_tool(work: np.ndarray, position: ArrayLike, rotation: ArrayLike) -> None:
+    """Write the pose of a tool into its array; `place_frames` places the capsules there.
+
+    Args:
+        work: array of the tool, see `tool_arrays`.
+        position: (3,) of the tcp in the world [m].
+        rotation: (4,) unit quaternion wxyz.
+    """
+    work[ROW.frames, FRAME.origin : FRAME.rotation] = position
+    work[ROW.frames, FRAME.rotation : FRAME.width] = rotation
 
 
 @inlined
 def place_tool(g, x, world):
-    """The tool's capsules at the pose x (a tuple of 8) into the rows from `world` on."""
+    """Place the tool's capsules at a pose.
+
+    Args:
+        g: array of the tool, see `tool_arrays`.
+        x: pose of the tcp, a tuple of 8.
+        world: first row of the result: ROW.placed or ROW.placed_next.
+    """
     p = screw.translation(x)
     for k in range(3):
-        g[FRAMES, 3 + k] = p[k]
+        g[ROW.frames, FRAME.origin + k] = p[k]
     for k in range(4):
-        g[FRAMES, 6 + k] = x[k]
+        g[ROW.frames, FRAME.rotation + k] = x[k]
     place_frames(g, world)
 
 
 @kernel
 def tool_slack(g, x, cutoff):
-    """Smallest room [m] of the tool at a pose; at most the cutoff."""
-    place_tool(g, x, NEXT)
-    return min_slack(g, NEXT, 0.0, cutoff)
+    """Return the smallest slack [m] of the tool at a pose, at most the cutoff.
+
+    Args:
+        g: array of the tool, see `tool_arrays`.
+        x: pose of the tcp, a tuple of 8.
+        cutoff: slack [m].
+    """
+    place_tool(g, x, ROW.placed_next)
+    return min_slack(g, ROW.placed_next, 0.0, cutoff)
 
 
 @inlined
@@ -90,11 +94,11 @@ def _moved(p, delta, s):
 
 @inner
 def _pair_slides_clear(g, c, k, delta, margin, s):
-    """True if capsule c, placed at WORLD, keeps its distance from obstacle k on a slide from fraction s on."""
-    a, b, radius = end_a(g, WORLD + c), end_b(g, WORLD + c), g[BODY + c, B_RADIUS]
+    """True if capsule c, placed at ROW.placed, keeps its margin from obstacle k on a slide from fraction s on."""
+    a, b, radius = end_a(g, ROW.placed + c), end_b(g, ROW.placed + c), g[ROW.body + c, CAPSULE.radius]
     length = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
     for _ in range(64):
-        distance, _, n = closest(g, OBSTACLES + k, g, _moved(a, delta, s), _moved(b, delta, s))
+        distance, _, n = closest(g, ROW.obstacles + k, g, _moved(a, delta, s), _moved(b, delta, s))
         slack = distance - radius - margin
         if slack < 0.0:
             return False
@@ -109,55 +113,75 @@ def _pair_slides_clear(g, c, k, delta, margin, s):
 
 @inlined
 def slide_is_clear(g, delta):
-    """True if the tool, placed at WORLD with its near pairs found within the slide's length, slides clear."""
-    first = int(g[HEADER, NEAR])
-    for row in range(first, first + int(g[HEADER, N_NEAR])):
-        slack = g[row, GAP] - g[row, KEEP]
-        slope = g[row, NORMAL] * delta[0] + g[row, NORMAL + 1] * delta[1] + g[row, NORMAL + 2] * delta[2]
+    """Return True if the tool slides clear from where it is placed.
+
+    Args:
+        g: array of the tool, see `tool_arrays`; placed at ROW.placed, its near pairs found within the slide's length.
+        delta: (3,) displacement [m].
+    """
+    first, k = int(g[ROW.header, HEADER.first_near]), NEAR_PAIR.normal
+    for row in range(first, first + int(g[ROW.header, HEADER.near])):
+        margin = g[row, NEAR_PAIR.margin]
+        slack = g[row, NEAR_PAIR.distance] - margin
+        slope = g[row, k] * delta[0] + g[row, k + 1] * delta[1] + g[row, k + 2] * delta[2]
         if slack < 0.0:
             return False
         if slope >= 0.0 or slack + slope >= 0.0:
             continue
-        c, k = int(g[row, FIRST]), int(g[row, OTHER])
-        if not _pair_slides_clear(g, c, k, delta, g[row, KEEP], -slack / slope):
+        c, obstacle = int(g[row, NEAR_PAIR.capsule]), int(g[row, NEAR_PAIR.other])
+        if not _pair_slides_clear(g, c, obstacle, delta, margin, -slack / slope):
             return False
     return True
 
 
 @kernel
 def point_speeds(g, twist):
-    """Largest speed [m] of a point of each capsule along a screw of this body twist, into column W_REACH."""
+    """Compute the largest speed of a point of each capsule along a screw, into the column PLACED.reach.
+
+    Args:
+        g: array of the tool, see `tool_arrays`.
+        twist: body twist (v, omega) of the screw, 6 numbers [m, rad].
+
+    Returns:
+        The largest speed of all [m per screw].
+    """
     fastest = 0.0
     v, w = (twist[0], twist[1], twist[2]), (twist[3], twist[4], twist[5])
-    for c in range(int(g[HEADER, N_CAPSULES])):
-        speed = 0.0
-        for end in (B_A, B_B):
-            u = screw.cross(w, (g[BODY + c, end], g[BODY + c, end + 1], g[BODY + c, end + 2]))
+    for c in range(int(g[ROW.header, HEADER.capsules])):
+        speed, row = 0.0, ROW.body + c
+        for end in (CAPSULE.a, CAPSULE.b):
+            u = screw.cross(w, (g[row, end], g[row, end + 1], g[row, end + 2]))
             x, y, z = v[0] + u[0], v[1] + u[1], v[2] + u[2]
             speed = max(speed, math.sqrt(x * x + y * y + z * z))
-        g[WORLD + c, W_REACH] = speed
+        g[ROW.placed + c, PLACED.reach] = speed
         fastest = max(fastest, speed)
     return fastest
 
 
 @kernel
 def longest_displacement(g, x, y):
-    """Longest way [m] of any point of the tool along the screw from pose x to pose y."""
+    """Return the longest displacement [m] of any point of the tool along the screw between two poses.
+
+    Args:
+        g: array of the tool, see `tool_arrays`.
+        x: pose of the tcp at the start, a tuple of 8.
+        y: pose at the end.
+    """
     return point_speeds(g, screw.twist_of(screw.mul(screw.conj(x), y)))
 
 
 @inner
 def _stretch(g, left, fastest):
-    """Fraction of the screw that is proven clear from the tool at NEXT on; -1 if it is too close already."""
+    """Fraction of the screw that is proven clear from the tool at ROW.placed_next on; -1 if it is too close already."""
     stretch = left
-    for k in range(int(g[HEADER, N_OBSTACLES])):
-        margin = g[OBSTACLES + k, MARGIN]
-        if all_beyond(g, NEXT, k, 0.0, margin + stretch * fastest):
+    for k in range(int(g[ROW.header, HEADER.obstacles])):
+        margin = g[ROW.obstacles + k, OBSTACLE.margin]
+        if all_beyond(g, ROW.placed_next, k, 0.0, margin + stretch * fastest):
             continue
-        for c in range(int(g[HEADER, N_CAPSULES])):
-            speed = g[WORLD + c, W_REACH]
+        for c in range(int(g[ROW.header, HEADER.capsules])):
+            speed = g[ROW.placed + c, PLACED.reach]
             if not may_touch(g, k, c):
-                slack = obstacle_distance(g, NEXT, c, k, 0.0, margin + stretch * speed) - margin
+                slack = obstacle_distance(g, ROW.placed_next, c, k, 0.0, margin + stretch * speed) - margin
                 if slack < 0.0:
                     return -1.0
                 if slack < stretch * speed:
@@ -167,14 +191,20 @@ def _stretch(g, left, fastest):
 
 @kernel
 def screw_is_clear(g, x, y):
-    """True if the tool keeps clear along the screw from pose x to pose y, the shorter way round, ends included."""
+    """Return True if the tool keeps clear along the shorter screw between two poses, ends included.
+
+    Args:
+        g: array of the tool, see `tool_arrays`.
+        x: pose of the tcp at the start, a tuple of 8.
+        y: pose at the end.
+    """
     twist = screw.twist_of(screw.mul(screw.conj(x), y))
-    for s in (0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
+    for s in (0.5, 0.25, 0.75):  # a blocked screw is mostly refused at once
         if tool_slack(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), 0.0) < 0.0:
             return False
     fastest, s = point_speeds(g, twist), 0.0
     for _ in range(2000):
-        place_tool(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), NEXT)
+        place_tool(g, screw.mul(x, screw.from_twist(screw.scaled(twist, s))), ROW.placed_next)
         stretch = _stretch(g, 1.0 - s, fastest)
         if stretch < 0.0:
             return False
@@ -188,7 +218,13 @@ def screw_is_clear(g, x, y):
 
 @kernel
 def edge_is_clear(g, x, y):
-    """True if the tool moves clear from x, where it is placed at WORLD with its near pairs found, to y."""
+    """Return True if the tool moves clear from a pose where it is placed to another.
+
+    Args:
+        g: array of the tool, see `tool_arrays`; placed at ROW.placed, its near pairs found.
+        x: pose of the tcp there, a tuple of 8.
+        y: pose at the end.
+    """
     if x[0] == y[0] and x[1] == y[1] and x[2] == y[2] and x[3] == y[3]:
         p, q = screw.translation(x), screw.translation(y)
         return slide_is_clear(g, (q[0] - p[0], q[1] - p[1], q[2] - p[2]))
@@ -197,7 +233,14 @@ def edge_is_clear(g, x, y):
 
 @kernel
 def is_clear(g, x, y, widest):
-    """True if the tool moves clear from pose x to pose y; `widest` is the largest distance to keep [m]."""
-    place_tool(g, x, WORLD)
+    """Return True if the tool moves clear between two poses.
+
+    Args:
+        g: array of the tool, see `tool_arrays`.
+        x: pose of the tcp at the start, a tuple of 8.
+        y: pose at the end.
+        widest: largest margin [m] of all obstacles.
+    """
+    place_tool(g, x, ROW.placed)
     find_near(g, screw.pose_distance(x, y)[0] + widest)
     return edge_is_clear(g, x, y)

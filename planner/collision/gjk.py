@@ -1,7 +1,7 @@
 """Compiled distance of a segment from a convex polyhedron (Gilbert, Johnson and Keerthi 1988), with a certificate.
 
-Works on the difference of the two sets: the distance is that of the origin from it. The answer is the *lower* bound
-that the last separating plane proves, so that rounding or an early stop can only make things look closer.
+The distance of two sets is that of the origin from their difference. The answer is the *lower* bound that the last
+separating plane proves, so that rounding or an early stop can only make things look closer.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ..jit import inner, kernel
 
 ITERATIONS = 64
 CLOSE = 1e-10
-"""Gap [m] between the proven bound and the best point at which the search ends."""
+"""Difference [m] between the distance of the best point and the proven bound at which the search ends."""
 
 
 @inner
@@ -82,7 +82,7 @@ def _volume(a, b, c, d):
 
 @inner
 def _tetrahedron(a, b, c, d):
-    """Weights of the corners at the nearest point to the origin; the last number is True if it is inside."""
+    """Weights of the corners at the point nearest to the origin; then True if the origin is inside."""
     zero = (0.0, 0.0, 0.0)
     whole = _volume(a, b, c, d)
     inside = (
@@ -116,7 +116,7 @@ def _tetrahedron(a, b, c, d):
 
 @inner
 def _folded(weights, size):
-    """Weights of the first `size` corners; the places behind them hold copies of the first."""
+    """Weights of the first `size` corners; the places after them hold copies of the first corner."""
     a, b, c, d = weights
     if size < 4:
         a, d = a + d, 0.0
@@ -129,7 +129,7 @@ def _folded(weights, size):
 
 @inner
 def _support(a, b, vertices, first, count, v):
-    """Corner of the difference that is farthest against v, and which end of the segment it comes from."""
+    """Corner of the difference that is farthest against v, and the end of the segment it comes from (0: a, 1: b)."""
     best, far = first, -1e300
     for i in range(first, first + count):
         s = vertices[i, 0] * v[0] + vertices[i, 1] * v[1] + vertices[i, 2] * v[2]
@@ -142,17 +142,18 @@ def _support(a, b, vertices, first, count, v):
 
 @kernel
 def segment_polytope(a, b, vertices, first, count):
-    """Proven distance [m] of a segment from the hull of vertices, and its parameter t at the closest point.
+    """Compute the proven distance of a segment from the convex hull of vertices.
 
     Args:
         a: one end (3), in the frame of the vertices [m].
         b: the other end (3).
-        vertices: (n, 3).
+        vertices: (n, 3) [m].
         first: row of the first vertex.
         count: number of vertices.
 
     Returns:
-        (distance, t, v): 0 if they touch; v (3) points from the polyhedron to the segment, not of unit length.
+        (distance, t, v): distance [m], 0 if they touch; parameter t in [0, 1] of the segment's closest point; vector
+        v (3) from the polyhedron to the segment, not of unit length.
     """
     v = _sub(a, (vertices[first, 0], vertices[first, 1], vertices[first, 2]))
     p0 = p1 = p2 = p3 = v

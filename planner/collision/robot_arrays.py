@@ -1,60 +1,151 @@
-"""One array that holds a robot with its body and the obstacles around it: what clearance and safety work on.
+"""The packed array of a robot with its body and the obstacles around it, which clearance and safety work on.
 
-A robot is one arm or several: joints are counted through, arm by arm. As in `workspace`, one array keeps calls from
-Python cheap and nothing is allocated in a loop. One per thread.
-
-| rows | hold |
-|---|---|
-| HEADER | arms, joints, capsules, obstacles, pairs, near pairs, and the first rows of what has no fixed place |
-| SETTINGS | of the safety layer, see `safety` |
-| ARMS | per arm: first joint, joints, first row of its chain |
-| LOW, HIGH, SPEED, SLIDING | joint limits, largest speeds, 1 for a sliding joint |
-| STEP to ACTIVE | scratch of the width of the joints |
-| PREVIOUS, DESIRED | the speeds that were commanded last, that are wanted now |
-| LEVERS | per joint: no point that it moves is ever farther from its axis [m] |
-| SEEN | joints at the last look at everything, then the smallest room then, 1 if it counts, 1 if obstacles move |
-| POSED | joints that the frames belong to |
-| TCPS | per arm: pose of its tcp |
-| CHAINS, FRAMES | see `chain`; the frame of joint j is row FRAMES + j |
-| BODY | per capsule: arm, joint whose frame it moves with (-1: none), ends in that frame, radius, ball that holds it |
-| WORLD, NEXT | per capsule: ends and center in the world, motion bound of a step; then a ball about all that move |
-| obstacles | see `shapes`; then a mask of capsules that may touch, safety distance |
-| pairs | capsules of the robot that may hit each other |
-| near | pairs that are close now, see `clearance` |
-| bounds | rows of the quadratic program |
-| vertices | of the meshes |
+A robot is one arm or several; joints and capsules are counted through, arm by arm. As in `arm_arrays`, one array
+keeps calls from Python cheap, and no kernel allocates. Use one array per thread.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import BadOption
-from ..geometry.screw import rotate
-from ..geometry.shapes import ROW, Packed
-from ..jit import inlined, inner, kernel
+from ..geometry.shapes import OBSTACLE, Packed
 from ..robot.arm import Arm
-from ..robot.body import Body
-from ..robot.kinematics import forward
+from ..robot.body import BODY, TOOL_CAPSULE, Body
+from ..robot.kinematics import CHAIN, PRISMATIC
 
 WIDTH = 40
 MAX_ARMS, MAX_JOINTS, MAX_CAPSULES = 2, 16, 52
-HEADER, SETTINGS, ARMS, LOW, HIGH, SPEED = 0, 1, 2, 3, 4, 5
-STEP, WISH, PART, AFTER, BEFORE, ACTIVE, PREVIOUS = 6, 7, 8, 9, 10, 11, 12
-SLIDING, TCPS, WEIGHT, CHAINS, DESIRED, LEVERS, SEEN, POSED = 13, 14, 16, 32, 60, 61, 62, 63
-FRAMES, BODY, WORLD, NEXT, FACTOR, OBSTACLES = 64, 84, 136, 188, 240, 272
-# columns of the header
-N_ARMS, N_JOINTS, N_CAPSULES, N_OBSTACLES, N_PAIRS, N_NEAR, PAIRS, NEAR, BOUNDS, VERTICES = range(10)
-# columns of a body row, and of a world row
-B_ARM, B_FRAME, B_A, B_B, B_RADIUS, B_BALL = 0, 1, 2, 5, 8, 9
-W_A, W_B, W_CENTER, W_REACH, W_ALL = 0, 3, 6, 9, 10
-# columns of SEEN
-SEEN_ROOM, SEEN_COUNTS, SEEN_MOVING = 16, 17, 18
-# further columns of an obstacle
-MASK, MARGIN = ROW, ROW + 1
+
+
+class Rows(NamedTuple):
+    """First rows of the parts; "per joint" means one column per joint."""
+
+    header: int = 0  # see HEADER
+    settings: int = 1  # of the safety layer, see SETTING
+    arms: int = 2  # one entry after another, see ARM_ENTRY
+    lower: int = 3  # lower joint limits [rad or m], per joint
+    upper: int = 4  # upper joint limits
+    speed: int = 5  # largest joint speeds [rad/s or m/s]
+    step: int = 6  # scratch: the joint step of the guard
+    stepped: int = 7  # scratch: the joints after that step
+    part: int = 8  # scratch: part of a step; columns from MAX_JOINTS on: a sample of the search in joint space
+    after: int = 9  # scratch: joints after a part
+    before: int = 10  # scratch: joints before a part
+    active: int = 11  # scratch: active rows of the quadratic program
+    previous: int = 12  # joint speeds of the last command
+    sliding: int = 13  # 1 for a joint that slides, 0 for a joint that turns
+    tcps: int = 14  # one row per arm: pose (8) of its tcp
+    weight: int = 16  # one row per joint: weight of the quadratic program
+    chains: int = 32  # kinematic chains, arm after arm, see `kinematics.CHAIN`
+    desired: int = 60  # wanted joint speeds
+    levers: int = 61  # largest distance [m] that any point moved by a joint ever has from its axis
+    last_look: int = 62  # joints at the last look at everything; then see LAST_LOOK
+    posed: int = 63  # joints that the frames belong to
+    frames: int = 64  # one row per joint, see `kinematics.FRAME`
+    body: int = 84  # one row per capsule, see CAPSULE
+    placed: int = 136  # one row per capsule, where it is now, see PLACED
+    placed_next: int = 188  # one row per capsule, where it is after a step, see PLACED
+    factor: int = 240  # scratch: Cholesky factor of the quadratic program
+    obstacles: int = 272  # one row per obstacle, see `shapes.OBSTACLE`; what follows starts at rows of the header
+
+
+class HeaderColumns(NamedTuple):
+    """Columns of the header: counts, and the first rows of the parts behind the obstacles."""
+
+    arms: int = 0
+    joints: int = 1
+    capsules: int = 2
+    obstacles: int = 3
+    pairs: int = 4  # pairs of the robot's own capsules that may hit each other
+    near: int = 5  # near pairs found last
+    first_pair: int = 6  # see PAIR
+    first_near: int = 7  # see NEAR_PAIR
+    first_bound: int = 8  # rows of the quadratic program, see `qp.QP`
+    first_vertex: int = 9  # vertices (3) of the meshes [m]
+
+
+class SettingColumns(NamedTuple):
+    """Columns of the settings, see `SafetySettings`; columns from `width` on are free."""
+
+    shell: int = 0  # [m]
+    alpha: int = 1  # [1/s]
+    buffer: int = 2  # [m]
+    limit_gain: int = 3  # [1/s], at most one over the period of the commands
+    rotation_weight: int = 4  # [m^2]
+    rest_weight: int = 5  # [m^2]
+    decay: int = 6
+    halvings: int = 7
+    slew: int = 8  # largest change of a joint's speed from one command to the next [rad/s]
+    self_margin: int = 9  # distance [m] to keep between capsules of the robot
+    width: int = 10
+
+
+class ArmEntry(NamedTuple):
+    """Columns of an arm's entry; the entry of arm k starts at column `k * width`."""
+
+    first_joint: int = 0
+    joints: int = 1
+    chain: int = 2  # first row of its chain
+    width: int = 3
+
+
+class LastLookColumns(NamedTuple):
+    """Columns of the last look at everything, behind the joints."""
+
+    slack: int = 16  # smallest slack then [m]
+    valid: int = 17  # 1 if the slack holds for the present obstacles and nothing was near
+    moving: int = 18  # 1 if an obstacle moves
+
+
+class CapsuleColumns(NamedTuple):
+    """Columns of a capsule of the body, in the frame that it moves with."""
+
+    arm: int = 0
+    frame: int = 1  # joint whose frame it moves with, counted through all arms; -1: the fixed base
+    a: int = 2  # one end of the core (3) [m]
+    b: int = 5  # the other end (3) [m]
+    radius: int = 8  # [m]
+    ball: int = 9  # radius [m] of the ball about the middle of the core that contains the capsule
+
+
+class PlacedColumns(NamedTuple):
+    """Columns of a placed capsule, in the world; the ball about all that moves stands in the first row only."""
+
+    a: int = 0  # one end of the core (3) [m]
+    b: int = 3  # the other end (3) [m]
+    center: int = 6  # middle of the core (3) [m]
+    reach: int = 9  # longest displacement [m] of any point of the capsule during a step
+    all_center: int = 10  # center (3) [m] of a ball that contains all capsules that move
+    all_radius: int = 13  # its radius [m]
+
+
+class PairColumns(NamedTuple):
+    """Columns of a pair of the robot's own capsules."""
+
+    first: int = 0
+    second: int = 1
+
+
+class NearPairColumns(NamedTuple):
+    """Columns of a near pair: a capsule with an obstacle, or with another capsule of the robot."""
+
+    self_pair: int = 0  # 1 if the other is a capsule of the robot, 0 if it is an obstacle
+    capsule: int = 1
+    other: int = 2  # the obstacle, or the other capsule
+    distance: int = 3  # [m]
+    margin: int = 4  # distance to keep [m]
+    normal: int = 5  # unit normal (3) from the other to the capsule
+    t: int = 8  # parameter in [0, 1] of the closest point on the capsule's core
+    s: int = 9  # the same on the core of the other capsule
+
+
+ROW, HEADER, SETTING, ARM_ENTRY, LAST_LOOK = Rows(), HeaderColumns(), SettingColumns(), ArmEntry(), LastLookColumns()
+CAPSULE, PLACED, PAIR, NEAR_PAIR = CapsuleColumns(), PlacedColumns(), PairColumns(), NearPairColumns()
 
 
 def robot_arrays(
@@ -65,18 +156,21 @@ def robot_arrays(
     masks: Sequence[int] = (),
     margin: float = 0.0,
     pairs: Sequence[tuple[int, int]] = (),
-    settings: Sequence[float] = (),
+    settings: ArrayLike = (),
 ) -> np.ndarray:
-    """The array of a robot among obstacles.
+    """Return the array of a robot among obstacles.
 
     Args:
         arms: the arms.
         bodies: their bodies, in the same order.
         packed: the obstacles.
         masks: per obstacle the capsules, counted through all bodies, that may touch it, as bits of a number.
-        margin: safety distance [m] to keep from obstacles without one of their own.
+        margin: safety distance [m] from obstacles without a margin of their own.
         pairs: capsules that may hit each other, counted through all bodies.
-        settings: numbers of the row SETTINGS.
+        settings: (k,) the row of the settings, see SETTING.
+
+    Raises:
+        BadOption: too many arms, joints or capsules.
     """
     count, joints = sum(len(body) for body in bodies), sum(arm.dof for arm in arms)
     if len(arms) > MAX_ARMS or count > MAX_CAPSULES or joints > MAX_JOINTS:
@@ -85,145 +179,84 @@ def robot_arrays(
             f"allowed are {MAX_ARMS}, {MAX_CAPSULES} and {MAX_JOINTS}"
         )
         raise BadOption("robot", reason)
-    work = np.zeros((OBSTACLES + len(pairs), WIDTH))
-    work[HEADER, :5] = len(arms), joints, count, 0, len(pairs)
-    work[HEADER, PAIRS] = OBSTACLES
-    work[SETTINGS, : len(settings)] = settings
-    work[POSED] = np.nan
+    work = np.zeros((ROW.obstacles + len(pairs), WIDTH))
+    header = work[ROW.header]
+    header[HEADER.arms], header[HEADER.joints], header[HEADER.capsules] = len(arms), joints, count
+    header[HEADER.pairs], header[HEADER.first_pair] = len(pairs), ROW.obstacles
+    work[ROW.settings, : np.size(settings)] = settings
+    work[ROW.posed] = np.nan
     if len(pairs):
-        work[OBSTACLES:, :2] = pairs
+        work[ROW.obstacles :, PAIR.first : PAIR.second + 1] = pairs
     _lay_arms(work, arms, bodies)
     return with_obstacles(work, packed, masks, margin)
 
 
 def with_obstacles(robot: np.ndarray, packed: Packed, masks: Sequence[int], margin: float) -> np.ndarray:
-    """The array of a robot, moved among other obstacles; see `robot_arrays`."""
-    joints, capsules, pairs = (int(robot[HEADER, column]) for column in (N_JOINTS, N_CAPSULES, N_PAIRS))
-    k, old = len(packed.rows), int(robot[HEADER, PAIRS])
+    """Return a copy of a robot's array among other obstacles.
+
+    Args:
+        robot: array of the robot.
+        packed: the obstacles.
+        masks: see `robot_arrays`.
+        margin: see `robot_arrays`.
+    """
+    joints, capsules, pairs = (int(robot[ROW.header, k]) for k in (HEADER.joints, HEADER.capsules, HEADER.pairs))
+    k, old = len(packed.rows), int(robot[ROW.header, HEADER.first_pair])
     near = capsules * k + pairs
-    first_pair = OBSTACLES + k
+    first_pair = ROW.obstacles + k
     first_near = first_pair + pairs
     first_bound = first_near + near
     first_vertex = first_bound + near + 2 * joints
     work = np.zeros((first_vertex + len(packed.vertices), WIDTH))
-    work[:OBSTACLES] = robot[:OBSTACLES]
-    work[HEADER, N_OBSTACLES : N_NEAR + 1] = k, pairs, 0
-    work[HEADER, PAIRS : VERTICES + 1] = first_pair, first_near, first_bound, first_vertex
-    work[SEEN, SEEN_COUNTS], work[SEEN, SEEN_MOVING] = 0.0, float(packed.rows[:, 17:20].any())
-    rows = work[OBSTACLES:first_pair]
-    rows[:, :ROW] = packed.rows
+    work[: ROW.obstacles] = robot[: ROW.obstacles]
+    header, look, rows = work[ROW.header], work[ROW.last_look], work[ROW.obstacles : first_pair]
+    header[HEADER.obstacles], header[HEADER.pairs], header[HEADER.near] = k, pairs, 0
+    header[HEADER.first_pair], header[HEADER.first_near] = first_pair, first_near
+    header[HEADER.first_bound], header[HEADER.first_vertex] = first_bound, first_vertex
+    velocities, own_margins = packed.rows[:, OBSTACLE.velocity : OBSTACLE.ball], packed.rows[:, OBSTACLE.own_margin]
+    look[LAST_LOOK.valid], look[LAST_LOOK.moving] = 0.0, float(velocities.any())
+    rows[:, : OBSTACLE.packed] = packed.rows
     # vertices lie in the same array: meshes know their rows in it
-    rows[:, 21] += first_vertex
-    rows[:, MASK] = masks if len(masks) else 0
-    rows[:, MARGIN] = np.where(packed.rows[:, 23] < 0, margin, packed.rows[:, 23])
+    rows[:, OBSTACLE.first_vertex] += first_vertex
+    rows[:, OBSTACLE.mask] = masks if len(masks) else 0
+    rows[:, OBSTACLE.margin] = np.where(own_margins < 0, margin, own_margins)
     work[first_pair:first_near] = robot[old : old + pairs]
     work[first_vertex:, :3] = packed.vertices
     return work
 
 
 def _lay_arms(work: np.ndarray, arms: Sequence[Arm], bodies: Sequence[Body]) -> None:
-    joint, chain, capsule = 0, CHAINS, BODY
+    joint, chain, capsule = 0, ROW.chains, ROW.body
     for k, (arm, body) in enumerate(zip(arms, bodies, strict=True)):
-        work[ARMS, 3 * k : 3 * k + 3] = joint, arm.dof, chain
-        columns = slice(joint, joint + arm.dof)
-        work[LOW, columns], work[HIGH, columns], work[SPEED, columns] = arm.lower, arm.upper, arm.velocity_limits
-        work[chain : chain + arm.dof + 1, :8] = arm.chain
-        work[SLIDING, columns] = arm.chain[:-1, 7]
+        entry = work[ROW.arms, ARM_ENTRY.width * k : ARM_ENTRY.width * (k + 1)]
+        entry[ARM_ENTRY.first_joint], entry[ARM_ENTRY.joints], entry[ARM_ENTRY.chain] = joint, arm.dof, chain
+        columns, slides = slice(joint, joint + arm.dof), arm.chain[:-1, CHAIN.kind] == PRISMATIC
+        work[ROW.lower, columns], work[ROW.upper, columns] = arm.lower, arm.upper
+        work[ROW.speed, columns] = arm.velocity_limits
+        work[chain : chain + arm.dof + 1, : CHAIN.width] = arm.chain
+        work[ROW.sliding, columns] = arm.chain[:-1, CHAIN.kind]
         rows = work[capsule : capsule + len(body)]
-        rows[:, B_ARM] = k
-        rows[:, B_FRAME] = np.where(body.rows[:, 0] < 0, -1, body.rows[:, 0] + joint)
-        lay_capsules(rows, body.rows[:, 1:8])
+        rows[:, CAPSULE.arm] = k
+        rows[:, CAPSULE.frame] = np.where(body.rows[:, BODY.frame] < 0, -1, body.rows[:, BODY.frame] + joint)
+        lay_capsules(rows, body.rows[:, BODY.a : BODY.width])
         # from joint to joint, then to the farthest point of a capsule; a slide may be anywhere in its range
-        offsets = np.linalg.norm(arm.chain[:, 4:7], axis=1)
-        offsets[:-1] += np.where(arm.chain[:-1, 7] == 1.0, np.maximum(abs(arm.lower), abs(arm.upper)), 0.0)
-        extents = np.linalg.norm(body.rows[:, 1:7].reshape(-1, 2, 3), axis=2).max(axis=1) if len(body) else np.zeros(1)
+        offsets = np.linalg.norm(arm.chain[:, CHAIN.offset : CHAIN.kind], axis=1)
+        offsets[:-1] += np.where(slides, np.maximum(abs(arm.lower), abs(arm.upper)), 0.0)
+        ends = body.rows[:, BODY.a : BODY.radius].reshape(-1, 2, 3)
+        extents = np.linalg.norm(ends, axis=2).max(axis=1) if len(body) else np.zeros(1)
         beyond = np.append(np.cumsum(offsets[:0:-1])[::-1], 0.0)[: arm.dof]
         levers = np.where(np.isfinite(beyond), beyond, 1e6) + extents.max()
-        work[LEVERS, columns] = np.where(arm.chain[:-1, 7] == 1.0, 1.0, levers)
+        work[ROW.levers, columns] = np.where(slides, 1.0, levers)
         joint, chain, capsule = joint + arm.dof, chain + arm.dof + 1, capsule + len(body)
 
 
 def lay_capsules(rows: np.ndarray, capsules: np.ndarray) -> None:
-    """Write capsules (m, 7), ends and radius, into body rows."""
-    rows[:, B_A : B_RADIUS + 1] = capsules
-    rows[:, B_BALL] = 0.5 * np.linalg.norm(capsules[:, 3:6] - capsules[:, :3], axis=1) + capsules[:, 6]
+    """Write capsules into rows of the body.
 
-
-@kernel
-def pose_arms(g, q):
-    """Forward kinematics of all arms at q (joints,): their frames into the rows FRAMES, if they are not there yet."""
-    posed = True
-    for i in range(len(q)):
-        posed &= g[POSED, i] == q[i]
-        g[POSED, i] = q[i]
-    if posed:
-        return
-    for k in range(int(g[HEADER, N_ARMS])):
-        first, dof, chain = int(g[ARMS, 3 * k]), int(g[ARMS, 3 * k + 1]), int(g[ARMS, 3 * k + 2])
-        x = forward(g[chain : chain + dof + 1], q[first : first + dof], g[FRAMES + first : FRAMES + first + dof])
-        for i in range(8):
-            g[TCPS + k, i] = x[i]
-
-
-@kernel
-def place_capsules(g, q, world):
-    """Capsules at q into the rows from `world` on (WORLD or NEXT)."""
-    pose_arms(g, q)
-    place_frames(g, world)
-
-
-@kernel
-def place_frames(g, world):
-    """Capsules at the frames as they are into the rows from `world` on."""
-    count = int(g[HEADER, N_CAPSULES])
-    for c in range(count):
-        frame, body, row = int(g[BODY + c, B_FRAME]), BODY + c, world + c
-        if frame < 0:
-            for i in range(6):
-                g[row, i] = g[body, B_A + i]
-            continue
-        f = FRAMES + frame
-        r = (g[f, 6], g[f, 7], g[f, 8], g[f, 9])
-        a = rotate(r, (g[body, 2], g[body, 3], g[body, 4]))
-        b = rotate(r, (g[body, 5], g[body, 6], g[body, 7]))
-        for i in range(3):
-            g[row, W_A + i] = a[i] + g[f, 3 + i]
-            g[row, W_B + i] = b[i] + g[f, 3 + i]
-            g[row, W_CENTER + i] = 0.5 * (g[row, W_A + i] + g[row, W_B + i])
-    _hold_all(g, world, count)
-
-
-@inner
-def _hold_all(g, world, count):
-    """A ball about all capsules that move, into columns 10 to 13 of the first row: center and radius."""
-    x = y = z = 0.0
-    moving = 0
-    for c in range(count):
-        if g[BODY + c, B_FRAME] >= 0.0:
-            x, y, z = x + g[world + c, W_CENTER], y + g[world + c, 7], z + g[world + c, 8]
-            moving += 1
-    x, y, z = x / max(moving, 1), y / max(moving, 1), z / max(moving, 1)
-    radius = 0.0
-    for c in range(count):
-        if g[BODY + c, B_FRAME] >= 0.0:
-            u, v, w = g[world + c, W_CENTER] - x, g[world + c, 7] - y, g[world + c, 8] - z
-            radius = max(radius, math.sqrt(u * u + v * v + w * w) + g[BODY + c, B_BALL])
-    g[world, W_ALL], g[world, 11], g[world, 12], g[world, 13] = x, y, z, radius
-
-
-@inlined
-def end_a(g, row):
-    """First end of a capsule in the world."""
-    return (g[row, 0], g[row, 1], g[row, 2])
-
-
-@inlined
-def end_b(g, row):
-    """Second end of a capsule in the world."""
-    return (g[row, 3], g[row, 4], g[row, 5])
-
-
-@inlined
-def may_touch(g, obstacle, capsule):
-    """True if a wanted contact: the pair is not looked at."""
-    return (int(g[OBSTACLES + obstacle, MASK]) >> capsule) & 1 == 1
+    Args:
+        rows: (m, WIDTH) rows of the body, see CAPSULE.
+        capsules: (m, 7) ends and radii, see `body.TOOL_CAPSULE`.
+    """
+    cores = capsules[:, TOOL_CAPSULE.b : TOOL_CAPSULE.radius] - capsules[:, TOOL_CAPSULE.a : TOOL_CAPSULE.b]
+    rows[:, CAPSULE.a : CAPSULE.ball] = capsules
+    rows[:, CAPSULE.ball] = 0.5 * np.linalg.norm(cores, axis=1) + capsules[:, TOOL_CAPSULE.radius]

@@ -1,1 +1,1 @@
-"""From a pose to joint speeds."""
+"""Control: joint speeds from poses and paths."""

@@ -8,48 +8,35 @@ Two laws give a task matrix M (6, dof) and a task velocity b (6) with `M qdot = 
   with which the arm runs away. N is 8 x dof of rank 6: with `A = Q R`, `N = A J_b`, it is solved as
   `(R J_b) qdot = gain * Q^T vec e`, which is the same pseudo-inverse without the two zero singular values.
 
-Both end in `qdot = z + M^T (M M^T + mu^2 I)^-1 (b - M z)`: damped least squares of the task, with a pull z to the
-middle of the joint ranges projected on the null space. Near a singularity, where damping would let the projection
-leak, z fades out. Then the limits: a joint that would pass its position limit is held at the allowed speed and the
-others take over, then all speeds are scaled together. (Not in the paper: a joint that is stopped alone bends the
-path; see Flacco, De Luca and Khatib 2012.)
+Both end in `qdot = z + M^T (M M^T + mu^2 I)^-1 (b - M z)`: damped least squares of the task, with joint speeds z
+towards the middle of the joint ranges projected on the null space. Near a singularity, where damping would let the
+projection leak, z fades out. Then the limits: a joint that would pass its position limit is held at the allowed speed
+and the others take over, then all speeds are scaled together. (Not in the paper: a joint that is stopped alone bends
+the path; see Flacco, De Luca and Khatib 2012.)
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import BadOption
+from ..columns import packed_row
 from ..geometry import screw
 from ..geometry.pose import Pose
 from ..jit import kernel
+from ..ranges import check_choice, check_ranges
 from ..robot.arm import Arm
-from .arm_arrays import (
-    BASIS,
-    CONTROL,
-    FACTOR,
-    GRAM,
-    JACOBIAN,
-    LIMITS,
-    NEED,
-    NULL,
-    SCRATCH,
-    SOLUTION,
-    TASK,
-    arm_arrays,
-    pose_and_jacobian,
-)
+from .arm_arrays import ARM, CONTROL, arm_arrays, pose_and_jacobian
 from .linear import backward_solve, cholesky, forward_solve, gram, smallest_singular_bound
 
 LAWS = ("log", "paper")
 SIGN_HYSTERESIS = 0.1
-"""Scalar part of the error beyond which the controller changes to the other way round."""
+"""Scalar part of the error beyond which the controller changes the direction of rotation."""
 LEAST_DAMPING = 1e-12
-"""Squared damping that keeps a rank-deficient task solvable."""
+"""Squared damping that makes a rank-deficient task solvable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +50,8 @@ class ControllerSettings:
         max_angular: largest turning speed of the tcp [rad/s].
         damping_threshold: singular value of the Jacobian below which damping sets in.
         max_damping: damping mu at a singularity.
-        null_gain: pull to the middle of the joint ranges [1/s], in the null space of the task.
-        limit_gain: approach to a joint limit is at most this times the distance to it [1/s].
+        null_gain: gain towards the middle of the joint ranges [1/s], in the null space of the task.
+        limit_gain: largest approach to a joint limit per distance to the limit [1/s].
     """
 
     law: str = "log"
@@ -77,122 +64,117 @@ class ControllerSettings:
     limit_gain: float = 20.0
 
     def __post_init__(self):
-        if self.law not in LAWS:
-            raise BadOption("law", f"{self.law!r} is not one of {', '.join(LAWS)}")
-        for name in ("gain", "max_linear", "max_angular", "limit_gain"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
-        for name in ("damping_threshold", "max_damping", "null_gain"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise BadOption(name, f"{getattr(self, name)} is not a number >= 0")
+        check_choice("law", self.law, LAWS)
+        check_ranges(self, "(0, inf)", "gain", "max_linear", "max_angular", "limit_gain")
+        check_ranges(self, "[0, inf)", "damping_threshold", "max_damping", "null_gain")
 
-    def packed(self) -> tuple[float, ...]:
-        """The settings as the kernels take them: the law as a number, then the others in order."""
-        return (float(LAWS.index(self.law)), *(float(value) for value in astuple(self)[1:]))
+    def packed(self) -> np.ndarray:
+        """Return the settings as the kernels take them, see `arm_arrays.CONTROL`."""
+        return packed_row(CONTROL, **{**asdict(self), "law": LAWS.index(self.law)})
 
 
 @kernel
 def _log_task(n, error, gain, work):
-    """Task of the log law."""
+    """Write the task of the log law."""
     xi = screw.twist_along(error)
     for k in range(6):
-        work[NEED, k] = gain * xi[k]
+        work[ARM.task_velocity, k] = gain * xi[k]
         for j in range(n):
-            work[TASK + k, j] = work[JACOBIAN + k, j]
+            work[ARM.task + k, j] = work[ARM.jacobian + k, j]
 
 
 @kernel
 def _paper_task(n, error, gain, work):
-    """Task of the corrected paper law, both sides times two so that M is near J_b for small errors.
+    """Write the task of the corrected paper law, both sides times two so that M is near J_b for small errors.
 
     Under a body twist xi, `vec(d(1 - x_e)/dt) = vec(xi x_e) / 2`, so the columns of -2 A are `vec(xi_k x_e)`.
     """
-    basis = work[BASIS : BASIS + 6]
+    basis = work[ARM.basis : ARM.basis + 6]
     for k in range(6):
         v = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
         w = (1.0 if k == 3 else 0.0, 1.0 if k == 4 else 0.0, 1.0 if k == 5 else 0.0)
         column = screw.mul((0.0, w[0], w[1], w[2], 0.0, v[0], v[1], v[2]), error)
         for j in range(8):
             basis[k, j] = -column[j]
-    gram(basis, 0, 8, work, GRAM)
-    cholesky(work, GRAM, 0.0, work, FACTOR)
+    gram(basis, 0, 8, work, ARM.gram)
+    cholesky(work, ARM.gram, 0.0, work, ARM.factor)
     for k in range(6):
         need = 0.0
         for j in range(8):
             need += basis[k, j] * ((1.0 if j == 0 else 0.0) - error[j])
-        work[NEED, k] = 2.0 * gain * need
+        work[ARM.task_velocity, k] = 2.0 * gain * need
         for j in range(n):
             s = 0.0
             for i in range(k, 6):
-                s += work[FACTOR + i, k] * work[JACOBIAN + i, j]
-            work[TASK + k, j] = s
-    forward_solve(work, FACTOR, work[NEED])
+                s += work[ARM.factor + i, k] * work[ARM.jacobian + i, j]
+            work[ARM.task + k, j] = s
+    forward_solve(work, ARM.factor, work[ARM.task_velocity])
 
 
 @kernel
 def _cap_twist(law, max_linear, max_angular, work):
-    """Scale the task velocity so that the twist it asks for stays within both bounds."""
-    twist = work[SCRATCH]
+    """Scale the task velocity so that its twist stays within both bounds."""
+    twist = work[ARM.scratch]
     for k in range(6):
-        twist[k] = work[NEED, k]
+        twist[k] = work[ARM.task_velocity, k]
     if law == 1.0:
-        backward_solve(work, FACTOR, twist)  # b = R xi; `_paper_task` left the factor R^T behind
+        backward_solve(work, ARM.factor, twist)  # b = R xi; `_paper_task` left the factor R^T behind
     v = math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
     w = math.sqrt(twist[3] ** 2 + twist[4] ** 2 + twist[5] ** 2)
     scale = min(1.0, max_linear / max(v, 1e-300), max_angular / max(w, 1e-300))
     for k in range(6):
-        work[NEED, k] *= scale
+        work[ARM.task_velocity, k] *= scale
 
 
 @kernel
 def _factor_task(n, threshold, largest, work):
-    """Factor `M M^T + mu^2 I`; returns the bound of M's sixth singular value, 0 if M is rank-deficient."""
-    gram(work, TASK, n, work, GRAM)
+    """Factor `M M^T + mu^2 I`; returns a lower bound of M's sixth singular value, 0 if M is rank-deficient."""
+    gram(work, ARM.task, n, work, ARM.gram)
     sigma = 0.0
-    if cholesky(work, GRAM, 0.0, work, FACTOR):
-        sigma = smallest_singular_bound(work, FACTOR, work[SCRATCH])
+    if cholesky(work, ARM.gram, 0.0, work, ARM.factor):
+        sigma = smallest_singular_bound(work, ARM.factor, work[ARM.scratch])
     if sigma < threshold:
         ratio = sigma / threshold
-        cholesky(work, GRAM, (1.0 - ratio * ratio) * largest * largest + LEAST_DAMPING, work, FACTOR)
+        cholesky(work, ARM.gram, (1.0 - ratio * ratio) * largest * largest + LEAST_DAMPING, work, ARM.factor)
     return sigma
 
 
 @kernel
 def _middle_pull(n, q, gain, work):
-    """Pull of every joint to the middle of its range, none for a continuous joint."""
+    """Write the speed of every joint towards the middle of its range, 0 for a continuous joint."""
     for i in range(n):
-        low, high = work[LIMITS, i], work[LIMITS + 1, i]
+        low, high = work[ARM.lower, i], work[ARM.upper, i]
         span = high - low
-        work[NULL, i] = -gain * (q[i] - 0.5 * (low + high)) / span**2 if span < 1e300 else 0.0
+        work[ARM.null, i] = -gain * (q[i] - 0.5 * (low + high)) / span**2 if span < 1e300 else 0.0
 
 
 @kernel
 def _least_squares(n, work, qdot):
-    """`z + M^T (M M^T + mu^2 I)^-1 (b - M z)` with what is ready in the workspace."""
-    b, z = work[SOLUTION], work[NULL]
+    """Compute `z + M^T (M M^T + mu^2 I)^-1 (b - M z)` from z, M, b and the factor in the array."""
+    b, z = work[ARM.solution], work[ARM.null]
     for k in range(6):
-        s = work[NEED, k]
+        s = work[ARM.task_velocity, k]
         for j in range(n):
-            s -= work[TASK + k, j] * z[j]
+            s -= work[ARM.task + k, j] * z[j]
         b[k] = s
-    forward_solve(work, FACTOR, b)
-    backward_solve(work, FACTOR, b)
+    forward_solve(work, ARM.factor, b)
+    backward_solve(work, ARM.factor, b)
     for j in range(n):
         s = z[j]
         for k in range(6):
-            s += work[TASK + k, j] * b[k]
+            s += work[ARM.task + k, j] * b[k]
         qdot[j] = s
 
 
 @kernel
 def _allowed(q, i, gain, work):
-    """Lowest and highest speed that joint i may have for the sake of its position limits."""
-    return -gain * (q[i] - work[LIMITS, i]), gain * (work[LIMITS + 1, i] - q[i])
+    """Lowest and highest speed of joint i by its position limits."""
+    return -gain * (q[i] - work[ARM.lower, i]), gain * (work[ARM.upper, i] - q[i])
 
 
 @kernel
 def _worst_joint(n, q, gain, work, qdot):
-    """The joint that exceeds its position bound most, and the speed it is allowed; -1 if there is none."""
+    """Joint that exceeds its position bound most, and its allowed speed; -1 if no joint does."""
     worst, excess, speed = -1, 1e-12, 0.0
     for i in range(n):
         low, high = _allowed(q, i, gain, work)
@@ -205,8 +187,8 @@ def _worst_joint(n, q, gain, work, qdot):
 
 @kernel
 def _hold_joints(n, q, threshold, largest, gain, work, qdot):
-    """Hold joints at their bounds, at most dof - 6 of them, and let the others do the whole task."""
-    held = work[NULL]
+    """Hold joints at their bounds, at most dof - 6 of them, and let the others take over the task."""
+    held = work[ARM.null]
     for i in range(n):
         held[i] = 0.0
     for _ in range(n - 6):
@@ -214,9 +196,9 @@ def _hold_joints(n, q, threshold, largest, gain, work, qdot):
         if joint < 0:
             return
         for k in range(6):
-            work[NEED, k] -= work[TASK + k, joint] * speed
-            work[TASK + k, joint] = 0.0
-        # a joint without a column keeps its z
+            work[ARM.task_velocity, k] -= work[ARM.task + k, joint] * speed
+            work[ARM.task + k, joint] = 0.0
+        # a joint without a column in M moves at its z
         held[joint] = speed
         _factor_task(n, threshold, largest, work)
         _least_squares(n, work, qdot)
@@ -229,8 +211,8 @@ def _scale_to_limits(n, q, gain, work, qdot):
     for i in range(n):
         low, high = _allowed(q, i, gain, work)
         speed = qdot[i]
-        if abs(speed) > work[LIMITS + 2, i]:
-            scale = min(scale, work[LIMITS + 2, i] / abs(speed))
+        if abs(speed) > work[ARM.speed, i]:
+            scale = min(scale, work[ARM.speed, i] / abs(speed))
         if speed > 0.0 and speed > high:
             scale = min(scale, max(high, 0.0) / speed)
         if speed < 0.0 and speed < low:
@@ -241,7 +223,15 @@ def _scale_to_limits(n, q, gain, work, qdot):
 
 @kernel
 def choose_sign(error, sign):
-    """The way round: the shorter one at first (sign 0), then kept until it is clearly the longer one."""
+    """Choose the direction of rotation: the shorter one at first, then the same one until it is clearly longer.
+
+    Args:
+        error: unit dual quaternion from the measured to the target pose, a tuple of 8.
+        sign: direction so far, 1 or -1; 0 if none was chosen yet.
+
+    Returns:
+        The sign of `error` to use, 1 or -1.
+    """
     if sign == 0.0:
         return 1.0 if error[0] >= 0.0 else -1.0
     return -sign if error[0] * sign < -SIGN_HYSTERESIS else sign
@@ -249,25 +239,26 @@ def choose_sign(error, sign):
 
 @kernel
 def joint_velocity(work, q, error, qdot):
-    """Joint speeds towards the target; the body Jacobian at q is ready in the workspace.
+    """Compute joint speeds towards a target.
 
     Args:
-        work: see `workspace.arm_arrays`.
+        work: array of the arm, see `arm_arrays`; its body Jacobian belongs to q.
         q: (dof,) joints that the error belongs to.
-        error: x_m* x_d as a tuple, its sign chosen.
-        qdot: (dof,) result.
+        error: x_m* x_d as a tuple of 8, its sign chosen.
+        qdot: (dof,) joint speeds, the result.
     """
-    law, gain, threshold, largest = work[CONTROL, 0], work[CONTROL, 1], work[CONTROL, 4], work[CONTROL, 5]
-    null_gain, limit_gain = work[CONTROL, 6], work[CONTROL, 7]
+    settings = work[ARM.control]
+    law, gain, limit_gain = settings[CONTROL.law], settings[CONTROL.gain], settings[CONTROL.limit_gain]
+    threshold, largest = settings[CONTROL.damping_threshold], settings[CONTROL.max_damping]
     n = len(q)
     if law == 0.0:
         _log_task(n, error, gain, work)
     else:
         _paper_task(n, error, gain, work)
-    _cap_twist(law, work[CONTROL, 2], work[CONTROL, 3], work)
+    _cap_twist(law, settings[CONTROL.max_linear], settings[CONTROL.max_angular], work)
     sigma = _factor_task(n, threshold, largest, work)
     fade = min(1.0, max(0.0, sigma - threshold) / max(threshold, 1e-9))
-    _middle_pull(n, q, null_gain * fade if n > 6 else 0.0, work)
+    _middle_pull(n, q, settings[CONTROL.null_gain] * fade if n > 6 else 0.0, work)
     _least_squares(n, work, qdot)
     _hold_joints(n, q, threshold, largest, limit_gain, work, qdot)
     _scale_to_limits(n, q, limit_gain, work, qdot)
@@ -275,7 +266,18 @@ def joint_velocity(work, q, error, qdot):
 
 @kernel
 def tick(work, q, target, sign, qdot):
-    """One control step: joint speeds from q towards the target (8,); returns the way round taken."""
+    """Do one control step: compute joint speeds from q towards a target.
+
+    Args:
+        work: array of the arm, see `arm_arrays`.
+        q: (dof,) joints.
+        target: (8,) pose of the tcp to approach.
+        sign: direction of rotation so far, see `choose_sign`.
+        qdot: (dof,) joint speeds, the result.
+
+    Returns:
+        The direction of rotation taken.
+    """
     x = pose_and_jacobian(work, q)
     goal = (target[0], target[1], target[2], target[3], target[4], target[5], target[6], target[7])
     error = screw.mul(screw.conj(x), goal)
@@ -287,7 +289,11 @@ def tick(work, q, target, sign, qdot):
 class Controller:
     """The control law bound to an arm: joint speeds from joint positions and a target pose.
 
-    It remembers which way round it turns (the double cover), with hysteresis; `reset` forgets it.
+    The controller remembers the direction of rotation (the double cover), with hysteresis; `reset` forgets it.
+
+    Attributes:
+        arm: the arm.
+        settings: gains and bounds.
     """
 
     def __init__(self, arm: Arm, settings: ControllerSettings | None = None):
@@ -297,11 +303,16 @@ class Controller:
         self._sign = 0.0
 
     def reset(self) -> None:
-        """Forget which way round was taken."""
+        """Forget the direction of rotation."""
         self._sign = 0.0
 
     def __call__(self, q: ArrayLike, target: Pose) -> np.ndarray:
-        """Joint speeds (dof,) [rad/s] at joints q (dof,) towards the target pose of the tcp."""
+        """Return joint speeds (dof,) [rad/s] towards a target.
+
+        Args:
+            q: (dof,) joints.
+            target: pose of the tcp to approach.
+        """
         qdot = np.empty(self.arm.dof)
         self._sign = tick(self._work, np.asarray(q, dtype=np.float64), target.dq, self._sign, qdot)
         return qdot

@@ -9,19 +9,20 @@ from ..geometry import screw
 from ..geometry.pose import Pose
 from ..jit import kernel
 from ..robot.arm import Arm
-from .arm_arrays import LIMITS, arm_arrays, pose_and_jacobian
+from .arm_arrays import ARM, arm_arrays, pose_and_jacobian
 from .controller import ControllerSettings, joint_velocity
 
 POSITION_TOLERANCE, ANGLE_TOLERANCE = 1e-4, 1e-3
+"""Distance [m] and angle [rad] within which a pose counts as reached."""
 _STEP = ControllerSettings(
     gain=0.5, max_linear=0.15, max_angular=0.5, null_gain=0.3, limit_gain=1.0, damping_threshold=0.03
 ).packed()
-"""Settings of one iteration, which is a control step of one second."""
+"""Settings of one iteration: a control step of one second."""
 
 
 @kernel
 def _solve(work, target, q, iterations, qdot):
-    """Move q to a solution; False where it is not reached."""
+    """Move q to a solution; returns False if none is reached."""
     for _ in range(iterations):
         x = pose_and_jacobian(work, q)
         distance, angle = screw.pose_distance(x, target)
@@ -34,9 +35,15 @@ def _solve(work, target, q, iterations, qdot):
 
 
 def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: int = 300) -> np.ndarray | None:
-    """Joints (dof,) that reach the pose within 0.1 mm and 1 mrad from a seed (dof,), or None.
+    """Return joints (dof,) that reach a pose within 0.1 mm and 1 mrad, or None.
 
-    Local: another seed may lead to another posture, or succeed where this one fails.
+    The search is local: another seed may lead to another posture, or succeed where this one fails.
+
+    Args:
+        arm: the arm.
+        target: pose of the tcp.
+        seed: (dof,) joints at the start of the search.
+        iterations: largest number of iterations.
     """
     q = np.array(seed, dtype=np.float64)
     goal = tuple(float(value) for value in target.dq)
@@ -44,7 +51,7 @@ def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: i
 
 
 def _unhurried(arm: Arm) -> np.ndarray:
-    """A workspace in which an iteration moves no joint by more than half a radian."""
+    """Array of the arm with limits by which an iteration moves no joint by more than half a radian."""
     work = arm_arrays(arm, _STEP)
-    work[LIMITS + 2] = 0.5
+    work[ARM.speed] = 0.5
     return work

@@ -1,4 +1,4 @@
-"""Compiled 6 x 6 linear algebra on rows of a workspace: nothing is allocated."""
+"""Compiled 6 x 6 linear algebra on rows of a packed array: nothing is allocated."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from ..jit import kernel
 
 @kernel
 def gram(m, row, n, out, out_row):
-    """`M M^T` of the six rows of m from `row` on, n columns wide."""
+    """Compute `M M^T` of six rows.
+
+    Args:
+        m: array with M.
+        row: first of the six rows of M.
+        n: number of columns of M.
+        out: array for the result.
+        out_row: first of its six rows.
+    """
     for i in range(6):
         for j in range(i + 1):
             s = 0.0
@@ -21,7 +29,15 @@ def gram(m, row, n, out, out_row):
 
 @kernel
 def cholesky(a, row, shift, low, low_row):
-    """Lower factor of `A + shift I`; False where a pivot is not positive up to rounding."""
+    """Compute the lower Cholesky factor of `A + shift I`; returns False if a pivot is not positive up to rounding.
+
+    Args:
+        a: array with A.
+        row: first of the six rows of A.
+        shift: number added to the diagonal.
+        low: array for the result.
+        low_row: first of its six rows.
+    """
     for j in range(6):
         s = a[row + j, j] + shift
         scale = s
@@ -41,7 +57,13 @@ def cholesky(a, row, shift, low, low_row):
 
 @kernel
 def forward_solve(low, row, b):
-    """`L^-1 b` of six numbers, in place."""
+    """Compute `L^-1 b` in place.
+
+    Args:
+        low: array with the lower factor L.
+        row: first of its six rows.
+        b: (>= 6,) six numbers.
+    """
     for i in range(6):
         s = b[i]
         for k in range(i):
@@ -51,7 +73,13 @@ def forward_solve(low, row, b):
 
 @kernel
 def backward_solve(low, row, b):
-    """`L^-T b` of six numbers, in place."""
+    """Compute `L^-T b` in place.
+
+    Args:
+        low: array with the lower factor L.
+        row: first of its six rows.
+        b: (>= 6,) six numbers.
+    """
     for j in range(6):
         i = 5 - j
         s = b[i]
@@ -62,13 +90,18 @@ def backward_solve(low, row, b):
 
 @kernel
 def smallest_singular_bound(low, row, b):
-    """Lower bound of the sixth singular value of M from the factor of `M M^T`: `1 / |M^+|_F`.
+    """Return a lower bound of the sixth singular value of M from the factor of `M M^T`: `1 / |M^+|_F`.
 
-    Between sigma_6 / sqrt(6) and sigma_6, and equal to it near a singularity, without an SVD.
+    The bound lies between sigma_6 / sqrt(6) and sigma_6, and equals sigma_6 near a singularity; no SVD is needed.
+
+    Args:
+        low: array with the lower factor of `M M^T`.
+        row: first of its six rows.
+        b: (>= 6,) scratch.
     """
     total = 0.0
     for j in range(6):
-        # column j of the inverse factor, which is zero above its diagonal
+        # column j of the inverse factor, zero above its diagonal
         b[j] = 1.0 / low[row + j, j]
         total += b[j] * b[j]
         for i in range(j + 1, 6):

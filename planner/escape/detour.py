@@ -1,7 +1,7 @@
-"""Compiled detours of a path: where is it blocked, where does the escape start, where does it come back.
+"""Compiled detours of a path: where the path is blocked, where a detour starts, where it rejoins the path.
 
-Method reference section 4: trigger, root, candidates for coming back, retries at another scale, shortcut, and again
-for the rest of the path. Every edge of what comes out has been proven clear exactly once.
+Method reference section 4: trigger, root, candidates for rejoining, retries at another scale, shortcut, and again for
+the rest of the path. Every edge of the result has been proven clear exactly once.
 """
 
 from __future__ import annotations
@@ -10,50 +10,48 @@ import math
 
 from ..collision.edge_certificates import is_clear, longest_displacement, tool_slack
 from ..geometry import screw
-from ..jit import inner, kernel
-from .escape_tree import (
-    AWAY,
-    CANDIDATES,
-    GROW,
-    MOST,
-    ON_SHELL,
-    PARENT,
-    RANDOM,
-    RETRIES,
-    ROUNDS,
-    SHELL,
-    SHORTCUT,
-    SHRINK,
-    SPACING,
-    STEP,
-    WIDEST,
-    grow,
-)
+from ..jit import inlined, inner, kernel
+from .escape_tree import grow
+from .tree_arrays import DETOUR_LOG, NODE, OPTION
 
 FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
-"""The path was clear; detours were found; why not. NODE_LIMIT: a tree was stopped while it still had leaves."""
+"""Status of an escape: the path was clear; detours were found; then the reasons of a failure. NODE_LIMIT: a tree was
+stopped while it still had open leaves."""
 MIN_SLACK = 0.005
-"""Room [m] that a root and the way back have at least, where an obstacle's own margin fills the shell."""
+"""Least slack [m] of a root and of the pose where a detour rejoins, if an obstacle's own margin fills the shell."""
 
 FAR_AHEAD = 0.5
-"""Room [m] beyond which it does not matter how much there is."""
+"""Largest slack [m] that is computed."""
+
+
+@inlined
+def _enough(options):
+    """Least slack [m] of a root and of the pose where a detour rejoins the path."""
+    return max(options[OPTION.shell] - options[OPTION.largest_margin], MIN_SLACK)
 
 
 @kernel
 def first_blocked(g, path, count, first, options):
-    """Index of the pose before the first edge that is not clear, from `first` on; -1 if all are.
+    """Return the index of the pose before the first edge that is not clear; -1 if all edges are clear.
 
-    Where there is room, one look at it proves several edges: none of them can use up more of it than its way.
+    One slack can prove several edges: no edge can reduce it by more than its own displacement.
+
+    Args:
+        g: the tool among obstacles, see `tool_arrays`.
+        path: (>= count, 8) poses of the tcp.
+        count: number of poses.
+        first: first edge to check.
+        options: see `tree_arrays.OPTION`.
     """
     left = 0.0
     for k in range(first, count - 1):
         x, y = screw.load8(path, k), screw.load8(path, k + 1)
-        if options[ON_SHELL] == 1.0 and tool_slack(g, y, 1.0) < max(options[SHELL] - options[WIDEST], MIN_SLACK):
+        if options[OPTION.on_shell] == 1.0 and tool_slack(g, y, 1.0) < _enough(options):
             return k
         displacement = longest_displacement(g, x, y)
         if left <= displacement:
             left = tool_slack(g, x, FAR_AHEAD)
-        if left <= displacement and not is_clear(g, x, y, options[WIDEST]):
+        if left <= displacement and not is_clear(g, x, y, options[OPTION.largest_margin]):
             return k
         left -= displacement
     return -1
@@ -61,14 +59,14 @@ def first_blocked(g, path, count, first, options):
 
 @inner
 def _slacks(g, path, count, slacks, cutoff):
-    """Room [m] at every pose, up to the cutoff."""
+    """Compute the slack [m] at every pose, at most the cutoff."""
     for k in range(count):
         slacks[k] = tool_slack(g, screw.load8(path, k), cutoff)
 
 
 @inner
 def _root(slacks, blocked, enough):
-    """The pose that the tree starts from: back from the blocked edge while the room is small and still grows."""
+    """Index of the root: back from the blocked edge while the slack is small and still grows."""
     k = blocked
     while k > 0 and slacks[k] < enough and slacks[k - 1] > slacks[k]:
         k -= 1
@@ -77,15 +75,15 @@ def _root(slacks, blocked, enough):
 
 @inner
 def _candidates(path, slacks, count, blocked, enough, most, places, poses):
-    """Poses behind the blocked stretch at which the path may go on: their number; indices and poses are written.
+    """Write indices and poses behind the blocked stretch where a detour may rejoin the path; returns their number.
 
-    The first with enough room, then some later ones, the last pose in the end. Where none has enough, because the
-    goal itself is close to an obstacle, those that are clear at all.
+    The first is the first pose with enough slack, then come some later ones, in the end the last pose. If none has
+    enough slack, because the goal itself is close to an obstacle, clear poses are taken.
     """
     for wanted in (enough, 0.0):
         size, step = 0, max(1, count // 10)
         k = blocked + 1
-        # the blocked stretch: the first pose that is not clear, if there is one, then all that are not
+        # skip the blocked stretch: poses up to the first that is not clear, then all that are not clear
         for j in range(blocked + 1, count):
             if slacks[j] < 0.0:
                 k = j
@@ -108,25 +106,25 @@ def _candidates(path, slacks, count, blocked, enough, most, places, poses):
 
 @inner
 def _branch(tree, row, poses):
-    """Poses from the root to a node, in order, into `poses`; their number."""
+    """Write the poses from the root to a node, in order, into `poses`; returns their number."""
     count, k = 0, row
     while k >= 0:
-        count, k = count + 1, int(tree[k, PARENT])
+        count, k = count + 1, int(tree[k, NODE.parent])
     k, place = row, count
     while k >= 0:
         place -= 1
         screw.store8(poses, place, screw.load8(tree, k))
-        k = int(tree[k, PARENT])
+        k = int(tree[k, NODE.parent])
     return count
 
 
 @inner
 def _shortened(g, poses, count, options):
-    """Leave out poses of a branch that can be jumped over clear; the new number. The ends stay."""
-    kept, at = 1, 0
+    """Remove poses of a branch that a clear edge can skip, except the ends; returns the new number."""
+    kept, at, widest = 1, 0, options[OPTION.largest_margin]
     while at < count - 1:
         ahead = count - 1
-        while ahead > at + 1 and not is_clear(g, screw.load8(poses, at), screw.load8(poses, ahead), options[WIDEST]):
+        while ahead > at + 1 and not is_clear(g, screw.load8(poses, at), screw.load8(poses, ahead), widest):
             ahead -= 1
         screw.store8(poses, kept, screw.load8(poses, ahead))
         kept, at = kept + 1, ahead
@@ -135,7 +133,15 @@ def _shortened(g, poses, count, options):
 
 @kernel
 def write_edge(out, count, x, y, spacing):
-    """Append poses from x (excluded) to y (included) at most `spacing` apart; the new number, -1 if out is full."""
+    """Append poses of a screw; returns the new number of poses, -1 if `out` is full.
+
+    Args:
+        out: (n, 8) poses.
+        count: number of poses in use.
+        x: pose at the start, a tuple of 8; it is not appended.
+        y: pose at the end, appended exactly.
+        spacing: largest path length [m] between poses.
+    """
     distance, angle = screw.pose_distance(x, y)
     steps = max(1, math.ceil(math.hypot(distance, 0.2 * angle) / spacing - 1e-9))
     if count + steps > len(out):
@@ -152,7 +158,11 @@ def write_edge(out, count, x, y, spacing):
 
 @inner
 def _joined(path, count, root, branch, size, back, out, spacing):
-    """The path up to the root, the branch, the path from index `back` on: (number of poses, where the last starts)."""
+    """Join the path up to the root, the branch, and the path from index `back` on.
+
+    Returns:
+        (number of poses, index of the pose where the branch rejoins the path); (-1, 0) if `out` is full.
+    """
     at = 0
     for k in range(root + 1):
         screw.store8(out, at, screw.load8(path, k))
@@ -172,34 +182,44 @@ def _joined(path, count, root, branch, size, back, out, spacing):
 
 @inner
 def _grown(g, root, candidates, tree, cells, heap, options, state):
-    """Grow trees at changing scales until one gets home: (row, candidate, rows of the last, True if one was full)."""
-    random, away = options[RANDOM], options[AWAY]
+    """Grow trees at changing scales until one sees a candidate.
+
+    Returns:
+        (row, candidate, rows of the last tree, True if a tree was full).
+    """
+    random, away = options[OPTION.random], options[OPTION.away]
     row, j, count, full = -1, -1, 0, False
-    for attempt in range(int(options[RETRIES]) + 1):
+    for attempt in range(int(options[OPTION.retries]) + 1):
         scale = 1.0
         if attempt > 0:
-            scale = options[SHRINK] if attempt % 2 == 0 else options[GROW]
-        options[RANDOM] = random if attempt > 0 else 0.0
-        row, j, count = grow(g, root, candidates, tree, cells, heap, options, scale * options[STEP], state)
+            scale = options[OPTION.shrink] if attempt % 2 == 0 else options[OPTION.grow]
+        options[OPTION.random] = random if attempt > 0 else 0.0
+        row, j, count = grow(g, root, candidates, tree, cells, heap, options, scale * options[OPTION.step], state)
         if row >= 0:
             break
-        full |= count >= min(len(tree), int(options[MOST]))
-    options[RANDOM], options[AWAY] = random, away
+        full |= count >= min(len(tree), int(options[OPTION.nodes]))
+    options[OPTION.random], options[OPTION.away] = random, away
     return row, j, count, full
 
 
 @kernel
 def last_tree(status, detours, most):
-    """Row of the log of `escape` that tells of the tree left behind: that of the failed detour, if one failed."""
+    """Return the row of the log of `escape` that belongs to the last tree: that of the failed detour, if one failed.
+
+    Args:
+        status: of the escape.
+        detours: number of detours that were found.
+        most: number of rows of the log.
+    """
     return detours - 1 if status == ESCAPED else min(detours, most - 1)
 
 
 @kernel
 def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap, options, state, log):
-    """Lead a path round obstacles.
+    """Lead a path around obstacles.
 
     Args:
-        g: the tool among obstacles, see `edges.tool_arrays`.
+        g: the tool among obstacles, see `edge_certificates.tool_arrays`.
         path: (cap, 8) the path in its first `count` rows; replaced by the result.
         count: number of poses.
         out: (cap, 8) scratch.
@@ -207,12 +227,12 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
         places: (c,) scratch.
         poses: (c, 8) scratch.
         branch: (b, 8) scratch.
-        tree: see `escape_tree.tree_arrays`; the last tree is left behind.
-        cells: same.
-        heap: same.
-        options: see `repet.RepetSettings`.
+        tree: see `tree_arrays.tree_arrays`; the last tree is left behind.
+        cells: see `tree_arrays.tree_arrays`.
+        heap: see `tree_arrays.tree_arrays`.
+        options: see `tree_arrays.OPTION`.
         state: (1,) of the random numbers.
-        log: (ROUNDS, 4) per detour: rows of its tree, first and last index of the detour in the path, retries.
+        log: (rounds, 3) one row per detour, see `tree_arrays.DETOUR_LOG`.
 
     Returns:
         (status, number of poses, detours).
@@ -221,27 +241,27 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
         return START_IN_COLLISION, count, 0
     if tool_slack(g, screw.load8(path, count - 1), 1.0) < 0.0:
         return GOAL_IN_COLLISION, count, 0
-    certain, enough = 0, max(options[SHELL] - options[WIDEST], MIN_SLACK)
-    for detour in range(int(options[ROUNDS])):
+    certain, enough = 0, _enough(options)
+    for detour in range(int(options[OPTION.rounds])):
         blocked = first_blocked(g, path, count, certain, options)
         if blocked < 0:
             return (ESCAPED if detour else FREE), count, detour
         _slacks(g, path, count, slacks, enough)
         root = _root(slacks, blocked, enough)
-        size = _candidates(path, slacks, count, blocked, enough, int(options[CANDIDATES]), places, poses)
+        size = _candidates(path, slacks, count, blocked, enough, int(options[OPTION.candidates]), places, poses)
         row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
-        log[detour, 0] = rows
+        log[detour, DETOUR_LOG.tree_rows] = rows
         if row < 0:
             return (NODE_LIMIT if full else NO_ESCAPE), count, detour
         length = _branch(tree, row, branch)
         screw.store8(branch, length, screw.load8(poses, j))
         length += 1
-        if options[SHORTCUT] == 1.0:
+        if options[OPTION.shortcut] == 1.0:
             length = _shortened(g, branch, length, options)
-        count, certain = _joined(path, count, root, branch, length, int(places[j]), out, options[SPACING])
+        count, certain = _joined(path, count, root, branch, length, int(places[j]), out, options[OPTION.spacing])
         if count < 0:
             return TOO_LONG, 0, detour
         for k in range(count):
             screw.store8(path, k, screw.load8(out, k))
-        log[detour, 1], log[detour, 2] = root, certain
-    return NO_ESCAPE, count, int(options[ROUNDS])
+        log[detour, DETOUR_LOG.first], log[detour, DETOUR_LOG.last] = root, certain
+    return NO_ESCAPE, count, int(options[OPTION.rounds])

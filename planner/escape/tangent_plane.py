@@ -1,4 +1,4 @@
-"""Compiled tangent planes: their axes, and the ways that children go in them."""
+"""Compiled tangent planes: their axes, and the displacements of children in them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ..jit import inlined, kernel
 
 SIDES = 8
 COSINES = tuple(math.cos(0.25 * math.pi * k) for k in range(SIDES))
-"""Ways that every node looks at: the corners and the middles of the sides."""
+"""Every node has this many regular children: at the corners of a square and the middles of its sides."""
 
 
 @kernel
 def random_number(state):
-    """A number in [0, 1) from a state (1,) that it moves on; the same on every machine (Park and Miller 1988)."""
+    """Return a number in [0, 1) and advance the state (1,); equal on every machine (Park and Miller 1988)."""
     number = (16807 * int(state[0])) % 2147483647
     state[0] = number
     return number / 2147483647.0
@@ -31,13 +31,14 @@ def _unit(v):
 
 @inlined
 def plane_basis(normal, towards, world_basis):
-    """Directions u and v of a plane: right-handed and orthonormal with the normal.
+    """Return directions u and v of a plane, right-handed and orthonormal with the normal.
 
     Args:
-        normal: (3,) unit.
-        towards: (3,) where the path goes on: v is its part in the plane, so that the basis turns with the problem.
+        normal: (3,) unit normal.
+        towards: (3,) direction to the pose of the path to reach: v is its part in the plane, so that the basis rotates
+            with the problem.
         world_basis: 1: v from the world axis that is least along the normal instead. (The paper always takes the
-            x axis, which fails where the normal is that axis.)
+            x axis, which fails if the normal is that axis.)
     """
     along = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2]
     v = (towards[0] - along * normal[0], towards[1] - along * normal[1], towards[2] - along * normal[2])
@@ -46,7 +47,7 @@ def plane_basis(normal, towards, world_basis):
         axis = (1.0, 0.0, 0.0) if x <= y and x <= z else ((0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0))
         v = screw.cross(axis, normal)
     v = _unit(v)
-    # nearly head-on the projection has lost digits: once more
+    # nearly head-on the projection loses digits: project again
     along = normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2]
     v = _unit((v[0] - along * normal[0], v[1] - along * normal[1], v[2] - along * normal[2]))
     return screw.cross(v, normal), v
@@ -54,7 +55,19 @@ def plane_basis(normal, towards, world_basis):
 
 @inlined
 def child_direction(k, normal, u, v, square, away, state):
-    """Way of child k in units of the step: eight sides, then random ones in the plane, some with a part outwards."""
+    """Return the displacement of a child in units of the step.
+
+    The regular children come first, then random children in the plane, with a random part along the normal.
+
+    Args:
+        k: number of the child.
+        normal: (3,) unit normal of the plane.
+        u: (3,) unit direction in the plane.
+        v: (3,) unit direction in the plane.
+        square: 1: children at the corners and the middles of the sides of a square, else on a circle.
+        away: largest part of a random child's displacement along the normal.
+        state: (1,) of the random numbers.
+    """
     if k < SIDES:
         # the paper's children: corners of a square, and the middles of its sides at 1 / sqrt(2) of the distance
         size = math.sqrt(0.5) if square == 1.0 and k % 2 == 1 else 1.0

@@ -1,7 +1,7 @@
-"""Capsules that together contain a shape: for what an arm holds, and for its links.
+"""Capsule covers: few capsules whose union contains a shape, for held objects and for links.
 
-Not in the paper: it moves a point. A capsule is cheap to query, and a union that contains a shape never lets a
-collision pass; what it sticks out only costs room.
+Not in the paper: the paper moves a point. A capsule is cheap to query, and a union that contains the shape misses no
+collision; protruding capsules only cost clearance.
 """
 
 from __future__ import annotations
@@ -17,34 +17,37 @@ from .hulls import Cover, box_axes, capsule_volume, circle_centers, core, corner
 from .shapes import Capsule, Mesh, Shape, Sphere
 
 MOST = 8
-"""Capsules for one shape."""
+"""Maximum number of capsules for one shape."""
 ABOUT = 1.5
-"""Fewer capsules are taken if they stick out by no more than this times what was asked."""
+"""Accepted protrusion of a cover, as a multiple of the requested excess; the smallest accepted cover is taken."""
 WORTH = 1.1
-"""Where none suffice: more capsules are taken only if they stick out less by this factor."""
+"""If no cover is accepted: take the fewest capsules that protrude by at most this multiple of the least protrusion."""
 SAFETY = 1e-9
-"""Added to every fitted radius [m], above rounding."""
+"""Increment [m] of every fitted radius, larger than rounding."""
 FACTORS = np.concatenate([[1.0, 1.01, 1.02, 1.035], np.arange(1.05, 1.65, 0.05)])
-"""Radii tried, in radii of the narrowest cylinder around: a wider capsule has a shorter core."""
+"""Radii tried, as multiples of the radius of the narrowest enclosing cylinder: a wider capsule has a shorter core."""
 SLACKS = np.array([0.0, 0.06, 0.15, 0.3])
-"""The same for a first try, less one."""
+"""Relative increases of that radius tried for an initial guess."""
 CLOSE = 1.15
-"""A second try is polished too if it is at most this times the best one."""
+"""The second initial guess is optimized too if its volume is at most this multiple of the smallest one."""
 FRACTIONS = (0.3, 0.4, 0.5, 0.6, 0.7)
-"""Where a hull is cut, of its extent."""
+"""Positions of the cutting planes of a hull, as fractions of its extent."""
 
 
 @lru_cache(maxsize=64)
 def covering_capsules(shape: Shape, excess: float = 0.01) -> Cover:
-    """As few capsules as possible that contain a shape and hardly stick out of it.
+    """Cover a shape with as few capsules as possible that hardly protrude from the shape.
 
     Args:
-        shape: in its own frame.
-        excess: how far [m] a capsule may stick out; one and a half times that is let pass. Where 8 capsules do
-            not suffice, about the least that 8 can.
+        shape: the shape in its own frame.
+        excess: largest protrusion [m] of a capsule; 1.5 times this is accepted. If 8 capsules do not suffice, the
+            protrusion is about the smallest that 8 capsules can reach.
 
     Returns:
         Capsules in the shape's frame; a sphere or a capsule is covered by exactly itself.
+
+    Raises:
+        UnfitShape: the excess is not a positive length.
     """
     if isinstance(shape, Sphere):
         return [(np.zeros(3), np.zeros(3), shape.radius)]
@@ -56,12 +59,15 @@ def covering_capsules(shape: Shape, excess: float = 0.01) -> Cover:
 
 
 def strips(points: np.ndarray, excess: float, axes: np.ndarray | None = None) -> Cover:
-    """Parallel capsules that contain the convex hull of points, as `covering_capsules`.
+    """Cover the convex hull of points with parallel capsules, as in `covering_capsules`.
 
     Args:
         points: (n, 3) [m].
-        excess: how far [m] a capsule may stick out.
-        axes: (3, 3) rows along which the strips may lie; default those of the smallest box around.
+        excess: largest protrusion [m] of a capsule.
+        axes: (3, 3) rows, the directions the strips may have; default: the axes of the smallest enclosing box.
+
+    Raises:
+        UnfitShape: the excess is not a positive length, or the points enclose no volume.
     """
     if not (math.isfinite(excess) and excess > 0):
         raise UnfitShape("cover", "excess", f"{excess!r} is not a length above 0")
@@ -88,11 +94,14 @@ def strips(points: np.ndarray, excess: float, axes: np.ndarray | None = None) ->
 
 
 def fitted_capsules(points: np.ndarray, count: int) -> Cover:
-    """Capsules of small volume that contain the convex hull of points.
+    """Cover the convex hull of points with capsules of small volume.
 
     Args:
         points: (n, 3) [m].
-        count: 1 to 3; the hull is cut by parallel planes into as many pieces.
+        count: number of capsules, 1 to 3; parallel planes cut the hull into as many pieces.
+
+    Raises:
+        UnfitShape: another count, or the points enclose no volume.
     """
     if count not in (1, 2, 3):
         raise UnfitShape("cover", "count", f"{count!r} is not 1, 2 or 3")
@@ -110,7 +119,7 @@ def fitted_capsules(points: np.ndarray, count: int) -> Cover:
 
 
 def _grid(points: np.ndarray, along: int, rows: int, columns: int) -> list[np.ndarray]:
-    """A hull cut into equal rows and columns of bars that lie along an axis."""
+    """Cut a hull into equal rows and columns of bars along an axis."""
     pieces = [points]
     for axis, count in (((along + 1) % 3, rows), ((along + 2) % 3, columns)):
         pieces = [part for piece in pieces for part in slices(piece, np.eye(3)[axis], _even(piece[:, axis], count))]
@@ -118,13 +127,17 @@ def _grid(points: np.ndarray, along: int, rows: int, columns: int) -> list[np.nd
 
 
 def _even(heights: np.ndarray, count: int) -> list[float]:
-    """Where to cut points of these heights into layers of the same thickness."""
+    """Return the heights that cut points of the given heights into layers of equal thickness."""
     low, high = float(heights.min()), float(heights.max())
     return [low + (high - low) * k / count for k in range(1, count)]
 
 
 def _along(piece: np.ndarray, along: int, normals: np.ndarray, support: np.ndarray) -> tuple[float, tuple]:
-    """The capsule along an axis around points that sticks least out of the hull with that support."""
+    """Find the capsule along an axis around points that protrudes least from the hull with the given support.
+
+    Returns:
+        The protrusion [m] and the capsule.
+    """
     heights, flat = piece[:, along], np.delete(piece, along, axis=1)
     center = circle_centers(flat[None])[0]
     squares = ((flat - center) ** 2).sum(axis=1)
@@ -140,7 +153,7 @@ def _along(piece: np.ndarray, along: int, normals: np.ndarray, support: np.ndarr
 
 
 def _starts(points: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Volumes (k,), parameters of `_about` (k, 5) and frames (k, 3, 3) of capsules along k axes, smallest first."""
+    """Return volumes (k,), parameters of `_about` (k, 5), frames (k, 3, 3) of capsules along k axes, smallest first."""
     axes = np.vstack([axes, np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]])
     frames = np.roll(np.linalg.svd(axes[:, None, :])[2], -1, axis=1)
     local = points @ frames.transpose(0, 2, 1)
@@ -158,7 +171,7 @@ def _starts(points: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _tightest(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """The capsule of about the smallest volume around points (n, 3)."""
+    """Return the capsule of about the smallest volume around points (n, 3)."""
     volumes, parameters, frames = _starts(points, box_axes(points))
     found = []
     for volume, start, frame in zip(volumes[:2], parameters[:2], frames[:2], strict=True):
@@ -171,7 +184,7 @@ def _tightest(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def _polished(start: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Parameters of `_about` that make the volume smaller, in two rounds: one often stops early at an edge."""
+    """Minimize the volume over the parameters of `_about` in two rounds: one round often stops early at an edge."""
     from scipy.optimize import minimize
 
     steps = np.diag([0.15, 0.15, *(0.1 * (points[:, :2].max(axis=0) - points[:, :2].min(axis=0))), 0.1])
@@ -186,7 +199,7 @@ def _polished(start: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _about(x: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """The capsule about the line through (x2, x3, 0) along (x0, x1, 1), by x4 wider than needed."""
+    """Return the capsule whose axis passes through (x2, x3, 0) along (x0, x1, 1); x4 is its relative excess radius."""
     axis = np.array([x[0], x[1], 1.0]) / math.sqrt(x[0] ** 2 + x[1] ** 2 + 1.0)
     foot = np.array([x[2], x[3], 0.0])
     arms = points - foot

@@ -1,9 +1,9 @@
-"""Unit dual quaternions on arrays `(..., 8)`: primary wxyz, dual wxyz; products are compositions of poses.
+"""Unit dual quaternions on arrays `(..., 8)`: primary wxyz, dual wxyz; products compose poses.
 
-All functions broadcast over leading axes and return new float64 arrays. x and -x are the same pose; each
-function says what it does with the sign. Logarithm, power and interpolation are the screw versions: rotation
-and translation move together along one axis. (DQ Robotics' `log` and `pow` move them apart: see
-`decoupled_lerp`.) Conventions: method reference section 1, twists `(v, omega)` in the body frame.
+All functions broadcast over leading axes and return new float64 arrays. x and -x are the same pose; each function
+states how it treats the sign. Logarithm, power and interpolation are the screw versions: rotation and translation
+share one axis. (DQ Robotics' `log` and `pow` decouple them: see `decoupled_lerp`.) Conventions: method reference
+section 1, twists `(v, omega)` in the body frame.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ CONJUGATE_8 = np.diag([1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0])
 CONJUGATE_8.flags.writeable = False
 UNIT_TOLERANCE = 1e-6
 ON_MANIFOLD = 1e-14
-"""Deviation from a unit dual quaternion that is rounding and nothing else."""
+"""Largest deviation from a unit dual quaternion that can only be rounding."""
 
 
 class ScrewParameters(NamedTuple):
-    """The screw of a displacement (Chasles): turn by `angle` about an axis and slide by `travel` along it.
+    """The screw of a displacement (Chasles): rotation by `angle` about an axis, translation by `travel` along it.
 
     Attributes:
         axis: (3,) unit direction; zero for the identity.
@@ -43,7 +43,7 @@ class ScrewParameters(NamedTuple):
 
     @property
     def point(self) -> Array:
-        """(3,) point of the axis that is closest to the origin [m]."""
+        """Point (3,) of the axis closest to the origin [m]."""
         return np.cross(self.axis, self.moment)
 
     @property
@@ -122,12 +122,12 @@ def _mapped(rows, x: ArrayLike, width_in: int, width_out: int, name: str) -> Arr
 
 
 def identity() -> Array:
-    """(8,) dual quaternion of no displacement."""
+    """Return the dual quaternion (8,) of no displacement."""
     return np.array(screw.IDENTITY)
 
 
 def mul(a: ArrayLike, b: ArrayLike) -> Array:
-    """Product of dual quaternions (..., 8), the composition of poses: `world_from_b` times `b_from_c`."""
+    """See `screw.mul`; the arrays (..., 8) broadcast."""
     a, b = _rows("a", a, 8), _rows("b", b, 8)
     shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
     out = np.empty((math.prod(shape), 8))
@@ -136,22 +136,24 @@ def mul(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def conj(x: ArrayLike) -> Array:
-    """Conjugate (..., 8), the inverse of a unit dual quaternion."""
+    """Return the conjugate (..., 8), the inverse of a unit dual quaternion."""
     return _rows("dual quaternion", x, 8) * np.diag(CONJUGATE_8)
 
 
 def normalized(x: ArrayLike) -> Array:
-    """Nearest unit dual quaternion (..., 8); the sign is kept."""
+    """Return the nearest unit dual quaternion (..., 8) of the same sign."""
     return _mapped(_normalize_rows, x, 8, 8, "dual quaternion")
 
 
 def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
-    """The input as float64 (..., 8), projected to the manifold if it is unit up to rounding.
+    """Check unit dual quaternions and project them to the manifold; exact ones stay bit-identical.
 
-    What is unit to the last digits is left alone, so that checking twice changes no bit.
+    Args:
+        x: (..., 8) unit up to rounding.
+        name: subject of error messages.
 
     Raises:
-        BadShape, NotFinite, NotUnit: the input is not a unit dual quaternion within 1e-6.
+        BadShape, NotFinite, NotUnit: x is not a unit dual quaternion within 1e-6.
     """
     array = _rows(name, x, 8)
     bad = np.argwhere(~np.isfinite(array))
@@ -171,7 +173,7 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
 
 
 def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:
-    """Unit dual quaternion (..., 8) of positions (..., 3) [m] and unit quaternions (..., 4), wxyz."""
+    """See `screw.from_pose`: (..., 8) of positions (..., 3) [m] and unit quaternions (..., 4) wxyz."""
     p, r = _rows("position", position, 3), _rows("quaternion", wxyz, 4)
     shape = np.broadcast_shapes(p.shape[:-1], r.shape[:-1])
     out = np.empty((math.prod(shape), 8))
@@ -180,49 +182,46 @@ def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:
 
 
 def translation(x: ArrayLike) -> Array:
-    """Positions (..., 3) [m]; the sign of x does not matter."""
+    """Return positions (..., 3) [m]; the sign of x does not matter."""
     return _mapped(_translation_rows, x, 8, 3, "dual quaternion")
 
 
 def twist_from_dq(x: ArrayLike) -> Array:
-    """Body twist (..., 6), (v, omega), that reaches x in unit time by the shortest screw motion.
-
-    Twice the screw logarithm; equals `pinocchio.log6(M).vector`. At a half turn see `is_half_turn`.
-    """
+    """Return the body twist (..., 6), (v, omega), of the shortest screw motion to x in unit time (`pinocchio.log6`)."""
     return _mapped(_twist_rows, x, 8, 6, "dual quaternion")
 
 
 def dq_from_twist(twist: ArrayLike) -> Array:
-    """Unit dual quaternion (..., 8) reached by a constant body twist (..., 6), (v, omega), in unit time."""
+    """Return the unit dual quaternion (..., 8) reached by a constant body twist (..., 6), (v, omega), in unit time."""
     return _mapped(_exp_rows, twist, 6, 8, "twist")
 
 
 def log(x: ArrayLike) -> Array:
-    """Screw logarithm (..., 8), a pure dual quaternion `(0, omega / 2, 0, v / 2)`; sign-free (shortest)."""
+    """Return the screw logarithm (..., 8), a pure dual quaternion `(0, omega / 2, 0, v / 2)`; sign-free (shortest)."""
     twist = 0.5 * twist_from_dq(x)
     zero = np.zeros((*twist.shape[:-1], 1))
     return np.concatenate([zero, twist[..., 3:], zero, twist[..., :3]], axis=-1)
 
 
 def exp(pure: ArrayLike) -> Array:
-    """Exponential (..., 8) of a pure dual quaternion (..., 8) as `log` gives it."""
+    """Return the exponential (..., 8) of a pure dual quaternion (..., 8), the inverse of `log`."""
     pure = _rows("pure dual quaternion", pure, 8)
     return dq_from_twist(2.0 * np.concatenate([pure[..., 5:], pure[..., 1:4]], axis=-1))
 
 
 def power(x: ArrayLike, tau: ArrayLike) -> Array:
-    """Power x^tau (..., 8): the fraction tau of the shortest screw motion to x."""
+    """See `sclerp`: x^tau (..., 8), the fraction tau of the shortest screw motion from the identity to x."""
     return dq_from_twist(np.asarray(tau, dtype=np.float64)[..., None] * twist_from_dq(x))
 
 
 def sclerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike, *, shortest: bool = True) -> Array:
-    """Screw linear interpolation (..., 8): `start (start* end)^tau`, a constant body twist along tau.
+    """Interpolate along a screw: `start (start* end)^tau` (..., 8), a constant body twist along tau.
 
     Args:
         start: (..., 8) pose at tau = 0.
         end: (..., 8) pose at tau = 1.
-        tau: (...) fraction; beyond [0, 1] the screw motion goes on.
-        shortest: the shorter of the two ways; False keeps the signs as given (the long way on purpose).
+        tau: (...) fraction; outside [0, 1] the screw motion is extrapolated.
+        shortest: True for the shorter rotation; False keeps the signs as given (deliberately the longer one).
 
     Paper: section II-A (ScLERP). The "minimum length" it claims does not hold; the equivariance does.
     """
@@ -235,12 +234,12 @@ def sclerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike, *, shortest: bool =
 
 
 def is_half_turn(x: ArrayLike) -> Array:
-    """True (...) where both ways round are equally short, so that the sign of the axis is a choice."""
+    """Return True (...) at a half turn: both rotations are equally short, so the sign of the axis is arbitrary."""
     return np.abs(_rows("dual quaternion", x, 8)[..., 0]) < screw.HALF_TURN
 
 
 def screw_parameters(x: ArrayLike) -> ScrewParameters:
-    """Screw of one displacement (8,), the shorter way; a pure translation has angle 0 and no moment."""
+    """Return the screw of the shorter motion to a displacement (8,); a pure translation has angle 0 and no moment."""
     twist = twist_from_dq(x)
     if twist.shape != (6,):
         raise BadShape("dual quaternion", np.shape(x), "(8,)")
@@ -255,7 +254,7 @@ def screw_parameters(x: ArrayLike) -> ScrewParameters:
 
 
 def dq_from_screw_parameters(screw_: ScrewParameters) -> Array:
-    """Displacement (8,) of a screw; inverse of `screw_parameters` up to sign."""
+    """Return the displacement (8,) of a screw; inverse of `screw_parameters` up to sign."""
     half = 0.5 * screw_.angle
     sine, cosine = math.sin(half), math.cos(half)
     dual = screw_.moment * sine + 0.5 * screw_.travel * cosine * screw_.axis
@@ -263,12 +262,12 @@ def dq_from_screw_parameters(screw_: ScrewParameters) -> Array:
 
 
 def hamilton_plus(a: ArrayLike) -> Array:
-    """Matrix H+ (8, 8) of the product from the left, `vec(a b) = H+(a) vec(b)`."""
+    """Return the matrix H+ (8, 8) of multiplication from the left, `vec(a b) = H+(a) vec(b)`."""
     return _hamilton(a, 1.0)
 
 
 def hamilton_minus(b: ArrayLike) -> Array:
-    """Matrix H- (8, 8) of the product from the right, `vec(a b) = H-(b) vec(a)`."""
+    """Return the matrix H- (8, 8) of multiplication from the right, `vec(a b) = H-(b) vec(a)`."""
     return _hamilton(b, -1.0)
 
 
@@ -285,10 +284,15 @@ def _hamilton(x: ArrayLike, sign: float) -> Array:
 
 
 def pose_error(current: ArrayLike, target: ArrayLike) -> Array:
-    """Distance (...) between poses, `min(|1 - c*x|, |1 + c*x|)` in R^8.
+    """Return the distance (...) between poses, `min(|1 - c*x|, |1 + c*x|)` in R^8; zero iff the poses are equal.
 
-    Zero iff the poses are the same, left-invariant, blind to signs.
-    Not in the paper: it prints the norm of a pair of vectors, which depends on the world origin and the sign.
+    Left-invariant and sign-free.
+
+    Args:
+        current: (..., 8) pose c.
+        target: (..., 8) pose x.
+
+    Not in the paper: the norm printed there, of a pair of vectors, depends on the world origin and on the sign.
     """
     z = mul(conj(current), target)
     one = identity()
@@ -296,14 +300,14 @@ def pose_error(current: ArrayLike, target: ArrayLike) -> Array:
 
 
 def pose_distance(current: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:
-    """Distance of the origins (...) [m] and angle of rotation (...) [rad] between poses; sign-free."""
+    """See `screw.pose_distance`: distance of the origins (...) [m] and rotation angle (...) [rad]; sign-free."""
     z = mul(conj(current), target)
     angle = 2.0 * np.arctan2(np.linalg.norm(z[..., 1:4], axis=-1), np.abs(z[..., 0]))
     return np.linalg.norm(translation(z), axis=-1), angle
 
 
 def continuous(path: ArrayLike) -> Array:
-    """Path (n, 8) with signs flipped so that neighbors lie on the same side of the double cover."""
+    """Return the path (n, 8) with signs flipped so that neighbors lie on the same side of the double cover."""
     path = _rows("path", path, 8)
     if len(path) < 2:
         return path.copy()
@@ -312,9 +316,9 @@ def continuous(path: ArrayLike) -> Array:
 
 
 def decoupled_lerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike) -> Array:
-    """Straight line for the position, slerp for the rotation (..., 8), the shorter way.
+    """See `sclerp` (shortest) for the arguments: here the position moves on a straight line, the rotation by slerp.
 
-    Not a screw motion: it changes with the choice of the tool frame. Here to be compared with.
+    Not a screw motion: the result depends on the choice of the tool frame. For comparison only.
     """
     start, end = _rows("start", start, 8), _rows("end", end, 8)
     tau = np.asarray(tau, dtype=np.float64)

@@ -1,6 +1,6 @@
-"""Convex hulls of points, and how capsules lie around them.
+"""Convex hulls of points, and the geometry of capsules around them.
 
-Not in the paper: it moves a point.
+Not in the paper: the paper moves a point.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from .shapes import Box, Cylinder, Mesh, Shape, Sphere, hull_corners
 Cover = list[tuple[np.ndarray, np.ndarray, float]]
 """Capsules: ends a (3,) and b (3,) of the core, radius [m]; a equals b for a ball."""
 RING = 24
-"""Corners of the prism around a cylinder: it is 0.9 % wider."""
+"""Corners of the prism around a cylinder: the prism is 0.9 % wider."""
 FACETS = 48
-"""Largest facets of a hull that the best box may lie on."""
+"""Number of largest hull facets tried as a side of the smallest box."""
 SAMPLES = 20000
-"""Points that measure a volume, to about 1 %."""
+"""Number of sample points of a volume estimate, accurate to about 1 %."""
 
 
 def corner_points(shape: Shape) -> np.ndarray:
-    """Points (n, 3) [m] whose hull contains a shape: exactly for a box or a mesh, else a little larger."""
+    """Return points (n, 3) [m] whose hull contains a shape: exactly for a box or a mesh, else slightly larger."""
     if isinstance(shape, Mesh):
         return shape.vertices
     if isinstance(shape, Box):
@@ -34,7 +34,7 @@ def corner_points(shape: Shape) -> np.ndarray:
     if isinstance(shape, Cylinder):
         heights = (-0.5 * shape.length, 0.5 * shape.length)
         return np.vstack([np.column_stack([shape.radius * ring, np.full(RING, height)]) for height in heights])
-    # rings on the latitudes where the profile's circumscribed polygon has its corners
+    # rings at the latitudes of the corners of the polygon circumscribed about the profile
     latitude = math.pi * (np.arange(7) - 3.0) / 6.0
     profile = shape.radius * np.column_stack([np.cos(latitude), np.sin(latitude)]) / math.cos(math.pi / 12)
     ball = np.vstack([np.column_stack([radius * ring, np.full(RING, height)]) for radius, height in profile])
@@ -44,10 +44,10 @@ def corner_points(shape: Shape) -> np.ndarray:
 
 
 def corners(points: np.ndarray) -> np.ndarray:
-    """The points (k, 3) that are corners of the hull of points (n, 3).
+    """Return the points (k, 3) that are corners of the hull of points (n, 3).
 
     Raises:
-        BadShape, NotFinite, UnfitShape: they are no points, or enclose no volume.
+        BadShape, NotFinite, UnfitShape: wrong shape, numbers that are not finite, or points that enclose no volume.
     """
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
@@ -58,14 +58,18 @@ def corners(points: np.ndarray) -> np.ndarray:
 
 
 def box_axes(points: np.ndarray) -> np.ndarray:
-    """(3, 3) rows: axes of about the smallest box around points (n, 3), longest first; one facet lies on it."""
+    """Return the axes of about the smallest box around points (n, 3), which has a facet of their hull on one side.
+
+    Returns:
+        (3, 3) unit rows, the longest side first.
+    """
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(points)
     triangles = points[hull.simplices]
     areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     facets = np.argsort(-areas, kind="stable")[:FACETS]
-    # the box's other sides lie along an edge of the facet, which is nearly always the best
+    # the box's other sides are aligned with an edge of the facet, nearly always the optimum
     normals = np.repeat(hull.equations[facets, :3], 3, axis=0)
     sides = (np.roll(triangles[facets], 1, axis=1) - triangles[facets]).reshape(-1, 3)
     sides = sides - np.einsum("ij,ij->i", sides, normals)[:, None] * normals
@@ -80,7 +84,16 @@ def box_axes(points: np.ndarray) -> np.ndarray:
 
 
 def slices(points: np.ndarray, axis: np.ndarray, cuts: list[float]) -> list[np.ndarray]:
-    """Corners of the pieces of a hull between parallel planes, those of the cross-sections included."""
+    """Cut a hull by parallel planes into pieces.
+
+    Args:
+        points: (n, 3) corners of the hull [m].
+        axis: (3,) unit normal of the planes.
+        cuts: increasing positions of the planes along the axis [m], within the hull.
+
+    Returns:
+        Corners (k, 3) of each piece, those of its cross-sections included.
+    """
     from scipy.spatial import ConvexHull
 
     if not cuts:
@@ -102,7 +115,7 @@ def slices(points: np.ndarray, axis: np.ndarray, cuts: list[float]) -> list[np.n
 
 
 def directions(count: int = 600) -> np.ndarray:
-    """Unit vectors (count + 6, 3) spread evenly over the sphere, the six of the axes among them."""
+    """Return unit vectors (count + 6, 3) spread evenly over the sphere, plus and minus the coordinate axes included."""
     height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     angle = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
     flat = np.sqrt(1.0 - height**2)
@@ -111,7 +124,7 @@ def directions(count: int = 600) -> np.ndarray:
 
 
 def circle_centers(flat: np.ndarray) -> np.ndarray:
-    """Centers (k, 2) of about the smallest circles around k sets of points (k, n, 2) [m]."""
+    """Return centers (k, 2) of about the smallest circles around k sets of points (k, n, 2) [m]."""
     center = 0.5 * (flat.min(axis=1) + flat.max(axis=1))
     best, least = center, np.full(len(flat), math.inf)
     every = np.arange(len(flat))
@@ -126,7 +139,16 @@ def circle_centers(flat: np.ndarray) -> np.ndarray:
 
 
 def core(heights: np.ndarray, squares: np.ndarray, radius: float) -> tuple[float, float]:
-    """Ends of the shortest core on a line, from the points' heights and squared distances from it [m]."""
+    """Return the ends of the shortest core on a line such that the capsule around the core contains points.
+
+    Args:
+        heights: (n,) positions of the points along the line [m].
+        squares: (n,) squared distances of the points from the line [m^2].
+        radius: of the capsule [m].
+
+    Returns:
+        Lower and upper end along the line [m]; equal if a ball suffices.
+    """
     reach = np.sqrt(np.maximum(radius**2 - squares, 0.0))
     low, high = float((heights + reach).min()), float((heights - reach).max())
     middle = 0.5 * (low + high)
@@ -134,23 +156,28 @@ def core(heights: np.ndarray, squares: np.ndarray, radius: float) -> tuple[float
 
 
 def capsule_volume(capsule: tuple[np.ndarray, np.ndarray, float]) -> float:
-    """Volume [m^3] of a capsule (a, b, radius)."""
+    """Return the volume [m^3] of a capsule (a, b, radius)."""
     a, b, radius = capsule
     return math.pi * radius**2 * (float(np.linalg.norm(b - a)) + 4.0 / 3.0 * radius)
 
 
 def sticks_out(cover: Cover, points: np.ndarray) -> float:
-    """How far [m] capsules reach beyond the hull of points (n, 3), to a few per cent of their radius."""
+    """Return the largest protrusion [m] of capsules from a hull, accurate to a few per cent of their radius.
+
+    Args:
+        cover: the capsules.
+        points: (n, 3) points that span the hull [m].
+    """
     normals = directions()
     support = (points @ normals.T).max(axis=0)
     return max(float((np.maximum(normals @ a, normals @ b) - support).max()) + radius for a, b, radius in cover)
 
 
 def union_volume(cover: Cover) -> float:
-    """Volume [m^3] that capsules fill together, measured by points spread evenly: the same ones every time."""
+    """Estimate the volume [m^3] of a union of capsules from evenly spread, always identical sample points."""
     low = np.min([np.minimum(a, b) - radius for a, b, radius in cover], axis=0)
     high = np.max([np.maximum(a, b) + radius for a, b, radius in cover], axis=0)
-    # powers of the real root of x^4 = x + 1 give the most even sequence in space
+    # powers of the real root of x^4 = x + 1 give the most even sequence in three dimensions
     steps = 1.2207440846057596 ** -np.arange(1.0, 4.0)
     points = low + (high - low) * ((0.5 + np.outer(np.arange(SAMPLES), steps)) % 1.0)
     inside = np.zeros(SAMPLES, dtype=bool)

@@ -1,4 +1,4 @@
-"""Poses and paths of poses: immutable shells around dual quaternion arrays."""
+"""Poses and paths of poses: immutable wrappers of dual quaternion arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from ..errors import BadShape, NotFinite, NotUnit
 from . import dualquat as dq
 
 METERS_PER_RADIAN = 0.2
-"""Lever [m] that turns an angle into a screw length."""
+"""Lever l [m/rad] of the weighted path length, which counts `sqrt(|dp|^2 + (l theta)^2)` [m] per step: a translation dp
+and a rotation by theta [rad]. "Path length" means this everywhere in the project."""
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:
@@ -40,12 +41,20 @@ class Pose:
 
     @staticmethod
     def identity() -> Pose:
-        """No displacement."""
+        """Return the pose of no displacement."""
         return Pose(dq.identity())
 
     @staticmethod
     def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> Pose:
-        """Pose of a position (3,) [m] and a unit quaternion (4,), wxyz."""
+        """Return the pose of a position and a quaternion.
+
+        Args:
+            position: (3,) [m].
+            wxyz: (4,) unit quaternion.
+
+        Raises:
+            NotUnit: the norm of the quaternion deviates from 1 by more than 1e-6.
+        """
         norm = float(np.linalg.norm(wxyz))
         if abs(norm - 1.0) > dq.UNIT_TOLERANCE:
             raise NotUnit("quaternion", norm)
@@ -53,7 +62,7 @@ class Pose:
 
     @staticmethod
     def from_vector(vector: ArrayLike) -> Pose:
-        """Pose of a vector (7,): x y z [m] then quaternion wxyz."""
+        """Return the pose of a vector (7,): x y z [m], then quaternion wxyz."""
         array = np.asarray(vector, dtype=np.float64)
         if array.shape != (7,):
             raise BadShape("pose vector", array.shape, "(7,)")
@@ -61,7 +70,11 @@ class Pose:
 
     @staticmethod
     def from_matrix(matrix: ArrayLike) -> Pose:
-        """Pose of a homogeneous matrix (4, 4)."""
+        """Return the pose of a homogeneous matrix (4, 4).
+
+        Raises:
+            BadShape, NotFinite, NotUnit: wrong shape, numbers that are not finite, or no rotation.
+        """
         from scipy.spatial.transform import Rotation
 
         array = np.asarray(matrix, dtype=np.float64)
@@ -77,27 +90,32 @@ class Pose:
 
     @staticmethod
     def from_yaw(position: ArrayLike, yaw: float) -> Pose:
-        """Upright pose at a position (3,) [m], turned by yaw [rad] about z."""
+        """Return an upright pose.
+
+        Args:
+            position: (3,) [m].
+            yaw: rotation about z [rad].
+        """
         return Pose.from_position_quaternion(position, [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
 
     @property
     def position(self) -> np.ndarray:
-        """(3,) [m]."""
+        """Position (3,) [m]."""
         return dq.translation(self.dq)
 
     @property
     def quaternion(self) -> np.ndarray:
-        """(4,) wxyz with w >= 0."""
+        """Quaternion (4,) wxyz with w >= 0."""
         return self.dq[:4] if self.dq[0] >= 0 else -self.dq[:4]
 
     @property
     def vector(self) -> np.ndarray:
-        """(7,): x y z [m] then quaternion wxyz."""
+        """Vector (7,): x y z [m], then quaternion wxyz."""
         return np.concatenate([self.position, self.quaternion])
 
     @property
     def rotation(self) -> np.ndarray:
-        """(3, 3) rotation matrix."""
+        """Rotation matrix (3, 3)."""
         w, x, y, z = self.dq[:4]
         return np.array(
             [
@@ -109,14 +127,14 @@ class Pose:
 
     @property
     def matrix(self) -> np.ndarray:
-        """(4, 4) homogeneous matrix."""
+        """Homogeneous matrix (4, 4)."""
         out = np.eye(4)
         out[:3, :3], out[:3, 3] = self.rotation, self.position
         return out
 
     @property
     def yaw(self) -> float:
-        """Turn about z [rad] in (-pi, pi] of the twist-swing split: the tilt is left out."""
+        """Rotation about z [rad] in (-pi, pi], by twist-swing decomposition: without the tilt."""
         w, _, _, z = self.dq[:4]
         return float(np.pi - (np.pi - 2.0 * np.arctan2(z, w)) % (2.0 * np.pi))
 
@@ -127,20 +145,20 @@ class Pose:
         return float(2.0 * np.arctan2(np.hypot(x, y), np.hypot(w, z)))
 
     def __repr__(self) -> str:
-        """Position and quaternion, rounded."""
+        """Show position and quaternion, rounded."""
         numbers = " ".join(f"{value:.4g}" for value in self.vector)
         return f"Pose([{numbers}])"
 
     def inverse(self) -> Pose:
-        """`b_from_a` of `a_from_b`."""
+        """Return `b_from_a` of `a_from_b`."""
         return Pose(dq.conj(self.dq))
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Composition."""
+        """Compose two poses."""
         return Pose(dq.mul(self.dq, other.dq))
 
     def distance_to(self, other: Pose) -> tuple[float, float]:
-        """Distance of the origins [m] and angle of rotation [rad] to another pose."""
+        """Return the distance of the origins [m] and the rotation angle [rad] to another pose."""
         distance, angle = dq.pose_distance(self.dq, other.dq)
         return float(distance), float(angle)
 
@@ -163,7 +181,7 @@ class PosePath:
 
     @staticmethod
     def from_vectors(vectors: ArrayLike) -> PosePath:
-        """Path of pose vectors (n, 7): x y z [m] then unit quaternion wxyz."""
+        """Return the path of pose vectors (n, 7): x y z [m], then unit quaternion wxyz."""
         array = np.asarray(vectors, dtype=np.float64)
         if array.ndim != 2 or array.shape[1] != 7:
             raise BadShape("pose vectors", array.shape, "(n, 7)")
@@ -171,21 +189,21 @@ class PosePath:
 
     @property
     def positions(self) -> np.ndarray:
-        """(n, 3) [m]."""
+        """Positions (n, 3) [m]."""
         return dq.translation(self.dqs)
 
     @property
     def quaternions(self) -> np.ndarray:
-        """(n, 4) wxyz, continuous signs."""
+        """Quaternions (n, 4) wxyz with continuous signs."""
         return self.dqs[:, :4]
 
     @property
     def vectors(self) -> np.ndarray:
-        """(n, 7): x y z [m] then quaternion wxyz."""
+        """Vectors (n, 7): x y z [m], then quaternion wxyz."""
         return np.concatenate([self.positions, self.quaternions], axis=1)
 
     def __repr__(self) -> str:
-        """Number of poses, first and last."""
+        """Show the number of poses, the first and the last one."""
         return f"PosePath({len(self)} poses, {self[0]!r} to {self[-1]!r})"
 
     def __len__(self) -> int:
@@ -197,35 +215,35 @@ class PosePath:
     @overload
     def __getitem__(self, index: slice) -> PosePath: ...
     def __getitem__(self, index: int | slice) -> Pose | PosePath:
-        """A pose, or the part of the path that a slice names."""
+        """Return a pose by its index, or a part of the path by a slice."""
         if isinstance(index, slice):
             return PosePath(self.dqs[index])
         return Pose(self.dqs[index])
 
     def __iter__(self) -> Iterator[Pose]:
-        """The poses in order."""
+        """Iterate over the poses in order."""
         return (Pose(row) for row in self.dqs)
 
     def moved(self, a_from_b: Pose) -> PosePath:
-        """The path carried by a displacement from the left (a change of world)."""
+        """Return the path displaced from the left (a change of world frame)."""
         return PosePath(dq.mul(a_from_b.dq, self.dqs))
 
     def with_tool(self, tcp_from_tool: Pose) -> PosePath:
-        """The path of another frame fixed to the moving body (a change of body frame)."""
+        """Return the path of another frame fixed to the moving body (a change of body frame)."""
         return PosePath(dq.mul(self.dqs, tcp_from_tool.dq))
 
     def reversed(self) -> PosePath:
-        """The path backwards."""
+        """Return the path backwards."""
         return PosePath(self.dqs[::-1])
 
     def joined(self, other: PosePath) -> PosePath:
-        """This path, then another; a first pose equal to our last one is not repeated."""
+        """Return this path followed by another; a first pose equal to our last one is not repeated."""
         distance, angle = self[-1].distance_to(other[0])
         start = 1 if distance < 1e-9 and angle < 1e-9 else 0
         return PosePath(np.concatenate([self.dqs, other.dqs[start:]]))
 
     def lengths(self, meters_per_radian: float = METERS_PER_RADIAN) -> np.ndarray:
-        """(n,) screw length [m] from the start: steps of `sqrt(|dp|^2 + (l theta)^2)`.
+        """Return the path length (n,) [m] from the start to every pose: cumulated `sqrt(|dp|^2 + (l theta)^2)`.
 
         Paper: "length" without a metric; this one is left-invariant, and depends on the body origin.
         """
@@ -234,6 +252,11 @@ class PosePath:
 
 
 def nearest(path: PosePath, pose: Pose) -> int:
-    """Index of the pose of a path that is nearest to a pose."""
+    """Return the index of the pose of a path nearest to a pose, by weighted distance (`METERS_PER_RADIAN`).
+
+    Args:
+        path: n poses.
+        pose: the pose, in the frame of the path.
+    """
     distance, angle = dq.pose_distance(pose.dq[None], path.dqs)
     return int(np.argmin(np.hypot(distance, METERS_PER_RADIAN * angle)))

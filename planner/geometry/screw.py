@@ -1,8 +1,8 @@
 """Compiled kernels of quaternions, dual quaternions and screw motions on tuples of floats.
 
 A quaternion is `(w, x, y, z)`, a unit dual quaternion `(primary wxyz, dual wxyz)`, a twist `(v, omega)` in
-the body frame. Tuples live in registers: nothing is allocated. `dualquat` wraps these for arrays.
-Formulas: the screw (not the decoupled) logarithm, with series where the closed forms lose digits.
+the body frame [m and rad per unit of time]. Tuples live in registers: nothing is allocated. `dualquat` wraps these
+kernels for arrays. Formulas: the screw (not the decoupled) logarithm, with series where closed forms lose digits.
 """
 
 from __future__ import annotations
@@ -13,12 +13,17 @@ from ..jit import kernel
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 HALF_TURN = 1e-12
-"""|scalar part| below which the shortest way is ambiguous (a half turn either way)."""
+"""Absolute scalar part below which the shortest rotation is ambiguous (a half turn in either sense)."""
 
 
 @kernel
 def load8(array, row):
-    """Row of an (n, 8) array as a tuple."""
+    """Return a row of an array as a tuple.
+
+    Args:
+        array: (n, 8).
+        row: index of the row.
+    """
     return (
         array[row, 0], array[row, 1], array[row, 2], array[row, 3],
         array[row, 4], array[row, 5], array[row, 6], array[row, 7],
@@ -27,20 +32,36 @@ def load8(array, row):
 
 @kernel
 def store8(array, row, x):
-    """Write a tuple of 8 into a row of an array."""
+    """Write a tuple into a row of an array.
+
+    Args:
+        array: (n, 8), changed in place.
+        row: index of the row.
+        x: 8 numbers.
+    """
     for k in range(8):
         array[row, k] = x[k]
 
 
 @kernel
 def cross(a, b):
-    """Cross product of two 3-tuples."""
+    """Return the cross product of two vectors.
+
+    Args:
+        a: left factor, 3 numbers.
+        b: right factor.
+    """
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @kernel
 def qmul(a, b):
-    """Hamilton product of two quaternions."""
+    """Return the Hamilton product of two quaternions.
+
+    Args:
+        a: left factor.
+        b: right factor.
+    """
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -51,7 +72,12 @@ def qmul(a, b):
 
 @kernel
 def rotate(r, p):
-    """Vector p turned by the unit quaternion r (body to world)."""
+    """Rotate a vector from the body to the world frame.
+
+    Args:
+        r: unit quaternion, `world_from_body`.
+        p: 3 numbers.
+    """
     u = (r[1], r[2], r[3])
     t = cross(u, p)
     t = (2.0 * t[0], 2.0 * t[1], 2.0 * t[2])
@@ -61,7 +87,12 @@ def rotate(r, p):
 
 @kernel
 def mul(a, b):
-    """Product of two dual quaternions: composition of poses."""
+    """Multiply two dual quaternions, which composes poses: `world_from_b` times `b_from_c`.
+
+    Args:
+        a: left factor.
+        b: right factor.
+    """
     r = qmul(a[:4], b[:4])
     d = qmul(a[:4], b[4:])
     e = qmul(a[4:], b[:4])
@@ -70,33 +101,38 @@ def mul(a, b):
 
 @kernel
 def conj(x):
-    """Conjugate: the inverse of a unit dual quaternion."""
+    """Return the conjugate, the inverse of a unit dual quaternion."""
     return (x[0], -x[1], -x[2], -x[3], x[4], -x[5], -x[6], -x[7])
 
 
 @kernel
 def neg(x):
-    """The other dual quaternion of the same pose."""
+    """Return the other dual quaternion of the same pose."""
     return (-x[0], -x[1], -x[2], -x[3], -x[4], -x[5], -x[6], -x[7])
 
 
 @kernel
 def from_pose(p, r):
-    """Unit dual quaternion of a position and a unit quaternion."""
+    """Return the unit dual quaternion of a position and a unit quaternion.
+
+    Args:
+        p: position, 3 numbers [m].
+        r: unit quaternion.
+    """
     d = qmul((0.0, p[0], p[1], p[2]), r)
     return (r[0], r[1], r[2], r[3], 0.5 * d[0], 0.5 * d[1], 0.5 * d[2], 0.5 * d[3])
 
 
 @kernel
 def translation(x):
-    """Position of a unit dual quaternion."""
+    """Return the position [m] of a unit dual quaternion."""
     t = qmul(x[4:], (x[0], -x[1], -x[2], -x[3]))
     return (2.0 * t[1], 2.0 * t[2], 2.0 * t[3])
 
 
 @kernel
 def normalized(x):
-    """Nearest unit dual quaternion: unit primary part, dual part orthogonal to it."""
+    """Return the nearest unit dual quaternion: unit primary part, dual part orthogonal to the primary part."""
     n = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3])
     r = (x[0] / n, x[1] / n, x[2] / n, x[3] / n)
     s = r[0] * x[4] + r[1] * x[5] + r[2] * x[6] + r[3] * x[7]
@@ -108,9 +144,9 @@ def normalized(x):
 
 @kernel
 def shorter(x):
-    """The sign of x whose rotation is at most a half turn.
+    """Return x or -x, whichever rotates by at most a half turn.
 
-    At a half turn both ways are equally short; then the first non-zero component of the axis is positive.
+    At a half turn both are equally short; then the first non-zero component of the axis is positive.
     """
     flip = x[0] < 0.0
     if abs(x[0]) < HALF_TURN:
@@ -124,7 +160,7 @@ def shorter(x):
 
 @kernel
 def twist_along(x):
-    """Body twist (v, omega) that reaches x from the identity in unit time, with the sign of x as it is.
+    """Return the body twist (v, omega) that reaches x from the identity in unit time, with the sign of x as given.
 
     Not the shortest motion where the scalar part is negative. At x = -1 the full turn has no axis: no
     rotation is returned.
@@ -157,13 +193,13 @@ def twist_along(x):
 
 @kernel
 def twist_of(x):
-    """Body twist (v, omega) of the shortest screw motion to x: twice the screw logarithm."""
+    """Return the body twist (v, omega) of the shortest screw motion to x: twice the screw logarithm."""
     return twist_along(shorter(x))
 
 
 @kernel
 def from_twist(xi):
-    """Unit dual quaternion of a body twist (v, omega) kept for unit time."""
+    """Return the unit dual quaternion reached by a constant body twist (v, omega) in unit time."""
     v = (xi[0], xi[1], xi[2])
     w = (xi[3], xi[4], xi[5])
     theta = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -184,19 +220,35 @@ def from_twist(xi):
 
 @kernel
 def scaled(xi, tau):
-    """Twist times a number."""
+    """Multiply a twist by a number.
+
+    Args:
+        xi: twist.
+        tau: the number.
+    """
     return (tau * xi[0], tau * xi[1], tau * xi[2], tau * xi[3], tau * xi[4], tau * xi[5])
 
 
 @kernel
 def sclerp(a, b, tau):
-    """Screw interpolation from a (tau = 0) to b (tau = 1) the shorter way."""
+    """Interpolate along the shorter screw motion from one pose to another.
+
+    Args:
+        a: dual quaternion at tau = 0.
+        b: dual quaternion at tau = 1.
+        tau: fraction of the motion.
+    """
     return mul(a, from_twist(scaled(twist_of(mul(conj(a), b)), tau)))
 
 
 @kernel
 def pose_distance(a, b):
-    """Distance of the origins [m] and angle of the rotation [rad] between two poses."""
+    """Return the distance of the origins [m] and the rotation angle [rad] between two poses.
+
+    Args:
+        a: dual quaternion of one pose; its sign does not matter.
+        b: dual quaternion of the other pose.
+    """
     z = mul(conj(a), b)
     t = translation(z)
     s = math.sqrt(z[1] * z[1] + z[2] * z[2] + z[3] * z[3])

@@ -1,19 +1,7 @@
-"""Shapes of obstacles and held objects, and the numbers that the compiled queries take.
+"""Shapes of obstacles and held objects, and their encoding for the compiled queries.
 
-A shape is described in its own frame, centered; boxes and cylinders by full extents as people measure them.
-`pack` lays obstacles out as rows of floats:
-
-| columns | meaning |
-|---|---|
-| 0 | kind: SPHERE, CAPSULE, BOX, CYLINDER or MESH |
-| 1 | rounding radius [m]: the surface is this far from the core |
-| 2 to 4 | center in the world [m] |
-| 5 to 13 | rotation, row by row, `world_from_shape` |
-| 14 to 16 | half extents of the core [m]; a capsule's core is the z axis between +- column 16 |
-| 17 to 19 | linear velocity [m/s] |
-| 20 | radius of a ball about the center that holds the shape [m] |
-| 21, 22 | first vertex and number of vertices of a mesh |
-| 23 | safety distance [m] to keep from this obstacle; negative: the general one |
+A shape is described in its own frame, centered; boxes and cylinders by full extents, as measured.
+`pack` encodes obstacles as rows of floats, see OBSTACLE.
 """
 
 from __future__ import annotations
@@ -28,12 +16,41 @@ import numpy as np
 from ..errors import BadShape, NotFinite, UnfitShape
 from .pose import Pose
 
-SPHERE, CAPSULE, BOX, CYLINDER, MESH = 0.0, 1.0, 2.0, 3.0, 4.0
-ROW = 24
 SMALLEST, LARGEST = 1e-6, 100.0
-"""Extents below or above these [m] are mistakes."""
+"""Plausible range of extents [m]."""
 MAX_VERTICES = 256
-"""Of one convex mesh: the queries look at all of them."""
+"""Maximum number of vertices of a convex mesh: every query visits all of them."""
+
+
+class ShapeKinds(NamedTuple):
+    """Numbers of the kinds of shapes, in the arrays of the planner and in observations; 0: no shape."""
+
+    sphere: float = 1.0
+    box: float = 2.0
+    capsule: float = 3.0
+    cylinder: float = 4.0
+    mesh: float = 5.0
+
+
+class ObstacleColumns(NamedTuple):
+    """Columns of an obstacle; `pack` fills those before `packed`, `robot_arrays` the others."""
+
+    kind: int = 0  # see SHAPE_KIND
+    rounding: int = 1  # rounding radius [m]: distance of the surface from the core
+    center: int = 2  # (3) in the world [m]
+    rotation: int = 5  # (9) row by row, `world_from_shape`
+    half_extents: int = 14  # (3) of the core [m]; of a capsule (0, 0, half its length)
+    velocity: int = 17  # (3) [m/s]
+    ball: int = 20  # radius of a ball about the center that contains the shape [m]
+    first_vertex: int = 21  # of a mesh
+    vertices: int = 22  # number of vertices of a mesh
+    own_margin: int = 23  # margin [m] of this obstacle; negative: the general margin
+    packed: int = 24  # number of columns that `pack` fills
+    mask: int = 24  # capsules that may touch the obstacle, as bits of a number
+    margin: int = 25  # distance to keep [m]
+
+
+SHAPE_KIND, OBSTACLE = ShapeKinds(), ObstacleColumns()
 
 
 def _length(shape: str, name: str, value: float) -> float:
@@ -64,7 +81,7 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class Capsule:
-    """All points within `radius` of a segment along z, centered.
+    """A centered capsule: all points within `radius` of a segment along z.
 
     Attributes:
         radius: [m].
@@ -97,7 +114,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Cylinder:
-    """A cylinder along z, centered.
+    """A centered cylinder along z.
 
     Attributes:
         radius: [m].
@@ -144,25 +161,25 @@ class Mesh:
         _set(self, vertices=points)
 
     def __eq__(self, other: object) -> bool:
-        """The same vertices in the same order."""
+        """Compare vertices, including their order."""
         return isinstance(other, Mesh) and np.array_equal(self.vertices, other.vertices)
 
     def __hash__(self) -> int:
-        """Of the vertices."""
+        """Hash of the vertices."""
         return hash(self.vertices.tobytes())
 
     @staticmethod
     def hull_of(points: np.ndarray) -> Mesh:
-        """The convex hull of points (n, 3)."""
+        """Return the convex hull of points (n, 3) [m]."""
         points = np.asarray(points, dtype=np.float64)
         return Mesh(points[hull_corners(points)])
 
 
 def hull_corners(points: np.ndarray) -> np.ndarray:
-    """Indices, in order, of the points (n, 3) that are corners of their convex hull.
+    """Return the indices, in order, of the points (n, 3) that are corners of their convex hull.
 
     Raises:
-        UnfitShape: they lie in a plane, on a line or in a point.
+        UnfitShape: the points enclose no volume (coplanar, collinear or coincident).
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -181,15 +198,15 @@ Shape = Sphere | Capsule | Box | Cylinder | Mesh
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Obstacle:
-    """A shape somewhere in the world, still or moving along a straight line.
+    """A shape in the world, at rest or moving along a straight line.
 
     Attributes:
-        shape: its form.
+        shape: form and size.
         pose: `world_from_shape` now.
-        velocity: (3,) of its center in the world [m/s]; it does not turn.
+        velocity: (3,) of the center in the world [m/s]; the obstacle does not rotate.
         name: for messages, reports and allow-lists.
-        margin: safety distance [m] to keep from this one; None: the general one. For the table, say, on which
-            things are put down.
+        margin: clearance [m] required from this obstacle; None: the general margin. Of use for a table, for example,
+            on which objects are placed.
     """
 
     shape: Shape
@@ -211,16 +228,16 @@ class Obstacle:
         _set(self, velocity=velocity)
 
     def at(self, seconds: float) -> Obstacle:
-        """The obstacle some seconds later, if it goes on as it does."""
+        """Return the obstacle after some seconds at constant velocity."""
         moved = Pose.from_position_quaternion(seconds * self.velocity) @ self.pose
         return Obstacle(self.shape, moved, self.velocity, self.name, self.margin)
 
 
 class Packed(NamedTuple):
-    """Obstacles as the kernels take them.
+    """Obstacles in the form the kernels take.
 
     Attributes:
-        rows: (k, 24), see the module.
+        rows: (k, 24), see OBSTACLE.
         vertices: (n, 3) of all meshes, in their own frames [m]; at least one row.
     """
 
@@ -229,43 +246,50 @@ class Packed(NamedTuple):
 
 
 def core_of(shape: Shape) -> tuple[float, float, tuple[float, float, float], float]:
-    """Kind, rounding radius, half extents of the core, and radius of the ball that holds the shape."""
+    """Return the core of a shape.
+
+    Returns:
+        Kind, rounding radius [m], half extents of the core [m] and radius of the ball that contains the shape [m].
+    """
     if isinstance(shape, Sphere):
-        return SPHERE, shape.radius, (0.0, 0.0, 0.0), shape.radius
+        return SHAPE_KIND.sphere, shape.radius, (0.0, 0.0, 0.0), shape.radius
     if isinstance(shape, Capsule):
         half = 0.5 * shape.length
-        return CAPSULE, shape.radius, (0.0, 0.0, half), half + shape.radius
+        return SHAPE_KIND.capsule, shape.radius, (0.0, 0.0, half), half + shape.radius
     if isinstance(shape, Box):
         x, y, z = (0.5 * extent for extent in shape.size)
-        return BOX, 0.0, (x, y, z), math.sqrt(x * x + y * y + z * z)
+        return SHAPE_KIND.box, 0.0, (x, y, z), math.sqrt(x * x + y * y + z * z)
     if isinstance(shape, Cylinder):
         half = 0.5 * shape.length
-        return CYLINDER, 0.0, (shape.radius, shape.radius, half), math.hypot(shape.radius, half)
+        return SHAPE_KIND.cylinder, 0.0, (shape.radius, shape.radius, half), math.hypot(shape.radius, half)
     x, y, z = np.abs(shape.vertices).max(axis=0)
-    return MESH, 0.0, (float(x), float(y), float(z)), float(np.linalg.norm(shape.vertices, axis=1).max())
+    return SHAPE_KIND.mesh, 0.0, (float(x), float(y), float(z)), float(np.linalg.norm(shape.vertices, axis=1).max())
 
 
 def pack(obstacles: Sequence[Obstacle]) -> Packed:
-    """Obstacles as rows of floats, in their order."""
-    rows = np.zeros((len(obstacles), ROW))
+    """Encode obstacles as rows of floats, in order."""
+    rows = np.zeros((len(obstacles), OBSTACLE.packed))
     vertices: list[np.ndarray] = []
     count = 0
     for row, obstacle in zip(rows, obstacles, strict=True):
-        row[0], row[1], row[14:17], row[20] = core_of(obstacle.shape)
-        row[2:5], row[5:14] = obstacle.pose.position, obstacle.pose.rotation.ravel()
-        row[17:20] = obstacle.velocity
-        row[23] = -1.0 if obstacle.margin is None else obstacle.margin
+        kind, rounding, half_extents, ball = core_of(obstacle.shape)
+        row[OBSTACLE.kind], row[OBSTACLE.rounding], row[OBSTACLE.ball] = kind, rounding, ball
+        row[OBSTACLE.half_extents : OBSTACLE.velocity] = half_extents
+        row[OBSTACLE.center : OBSTACLE.rotation] = obstacle.pose.position
+        row[OBSTACLE.rotation : OBSTACLE.half_extents] = obstacle.pose.rotation.ravel()
+        row[OBSTACLE.velocity : OBSTACLE.ball] = obstacle.velocity
+        row[OBSTACLE.own_margin] = -1.0 if obstacle.margin is None else obstacle.margin
         if isinstance(obstacle.shape, Mesh):
-            row[21], row[22] = count, len(obstacle.shape.vertices)
+            row[OBSTACLE.first_vertex], row[OBSTACLE.vertices] = count, len(obstacle.shape.vertices)
             vertices.append(obstacle.shape.vertices)
             count += len(obstacle.shape.vertices)
     return Packed(rows, np.concatenate(vertices) if vertices else np.zeros((1, 3)))
 
 
 STILL = 1e-4
-"""Speed [m/s] up to which an obstacle stands still."""
+"""Largest velocity component [m/s] of an obstacle that counts as standing."""
 
 
 def moves(obstacle: Obstacle) -> bool:
-    """True if an obstacle is faster than what counts as standing still."""
+    """Return True if an obstacle moves faster than `STILL`."""
     return float(np.abs(obstacle.velocity).max()) > STILL

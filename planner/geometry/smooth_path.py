@@ -1,7 +1,7 @@
-"""Smooth (C1) paths through given poses, and thinning of dense ones; built of screw motions only.
+"""Smooth (C1) paths through given poses, and thinning of dense paths; built of screw motions only.
 
 A Hermite segment is a Bezier curve on the group: four control poses, joined by de Casteljau's scheme with ScLERP
-in place of the straight line. Body twists at the knots are averages of the screws next to them. All of it is
+in place of the straight line. Body twists at the knots are averages of the adjacent screws. All of it is
 equivariant to changes of world and of tool frame as long as the knots are; see `knots_of`.
 
 Not in the paper: its paths have corners in the twist. Method reference section 9; compare Allmendinger,
@@ -17,19 +17,20 @@ from numpy.typing import ArrayLike
 
 from ..errors import BadOption, BadShape
 from ..jit import kernel
+from ..ranges import check_choice, check_range
 from . import dualquat as dq
 from . import screw
 from .pose import METERS_PER_RADIAN, PosePath
 
 REPEAT = 1e-9
-"""Screw length [m] below which neighbors are the same pose."""
+"""Path length [m] below which neighbors count as the same pose."""
 SERIES_TERMS = 40
-"""Terms of the Jacobian of exp: below rounding for rotations up to a full turn."""
+"""Terms of the Jacobian of exp: the truncation error is below rounding for rotations up to a full turn."""
 
 
 @kernel
 def _between(a, b, tau):
-    """ScLERP with the signs as they are: no jump where a control polygon turns by more than a half turn."""
+    """ScLERP with the signs as given: no jump where a control polygon turns by more than a half turn."""
     xi = screw.twist_along(screw.mul(screw.conj(a), b))
     return screw.mul(a, screw.from_twist(screw.scaled(xi, tau)))
 
@@ -47,7 +48,10 @@ def _bezier_rows(controls, segment, tau, out):
 
 @kernel
 def _worst_between(dqs, lengths, first, last, lever):
-    """Largest screw length to the screw from one pose to another, at equal fractions of the length, and where."""
+    """Return the largest weighted distance [m] of poses to the screw between two of them, and the index of that pose.
+
+    Poses are compared at equal fractions of the path length.
+    """
     worst, where = 0.0, first
     a, b = screw.load8(dqs, first), screw.load8(dqs, last)
     whole = lengths[last] - lengths[first]
@@ -87,7 +91,7 @@ class SmoothPath:
             object.__setattr__(self, name, value)
 
     def poses(self, u: ArrayLike) -> np.ndarray:
-        """Poses (m, 8) at parameters u (m,); exactly the given ones at the knots."""
+        """Return poses (m, 8) at parameters u (m,); exactly the given ones at the knots."""
         segment, tau = self._located(u)
         out = np.empty((len(tau), 8))
         _bezier_rows(self._controls().reshape(-1, 8), segment, tau, out)
@@ -96,7 +100,7 @@ class SmoothPath:
         return out
 
     def body_twists(self, u: ArrayLike) -> np.ndarray:
-        """Body twists (m, 6), (v, omega), per unit of u, at parameters u (m,); exact derivatives of `poses`."""
+        """Return body twists (m, 6), (v, omega), per unit of u, at parameters u (m,): exact derivatives of `poses`."""
         segment, tau = self._located(u)
         poses = [self._controls()[segment, k] for k in range(4)]
         twists = [np.zeros((len(tau), 6)) for _ in range(4)]
@@ -107,7 +111,7 @@ class SmoothPath:
         return twists[0] / np.diff(self.knots)[segment, None]
 
     def _located(self, u: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Segment (m,) and fraction of it (m,) of the parameters u (m,)."""
+        """Return the segment (m,) and the fraction of the segment (m,) of parameters u (m,)."""
         u = np.asarray(u, dtype=np.float64)
         low, high = self.knots[[0, -1]]
         if u.ndim != 1:
@@ -118,7 +122,7 @@ class SmoothPath:
         return segment, (u - self.knots[segment]) / (self.knots[segment + 1] - self.knots[segment])
 
     def _controls(self) -> np.ndarray:
-        """Control poses (n - 1, 4, 8): a third of the way along the twists at both ends."""
+        """Return control poses (n - 1, 4, 8): the inner ones a third of a step along the twists at both ends."""
         third = np.diff(self.knots)[:, None] / 3.0
         after = dq.mul(self.dqs[:-1], dq.dq_from_twist(third * self.twists[:-1]))
         before = dq.mul(self.dqs[1:], dq.dq_from_twist(-third * self.twists[1:]))
@@ -126,12 +130,15 @@ class SmoothPath:
 
 
 def knots_of(path: PosePath, knots: str | ArrayLike = "length") -> np.ndarray:
-    """Knots (n,) of a path.
+    """Return the knots (n,) of a path.
 
     Args:
         path: n poses.
-        knots: "length" (screw length [m]: left-invariant, depends on the body origin), "index" (invariant to both
-            world and tool changes, but uneven steps swing), or (n,) increasing numbers, such as times [s].
+        knots: "length" (path length [m]: left-invariant, depends on the body origin), "index" (invariant to both
+            world and tool changes, but uneven steps overshoot), or (n,) increasing numbers, such as times [s].
+
+    Raises:
+        BadOption, BadShape: unknown name, knots that do not increase, or another number of knots.
     """
     if isinstance(knots, str):
         if knots not in ("length", "index"):
@@ -143,18 +150,20 @@ def knots_of(path: PosePath, knots: str | ArrayLike = "length") -> np.ndarray:
 
 
 def smooth(path: PosePath, *, knots: str | ArrayLike = "length", ends: str = "one-sided") -> SmoothPath:
-    """The C1 curve through the poses of a path.
+    """Lay a C1 curve through the poses of a path.
 
     The twist at a knot averages the screws before and after it, as a parabola through three points does: even steps
-    give the method's `2 log(x_{i-1}* x_{i+1}) / (h_{i-1} + h_i)` up to third order, but no half turn is in the way.
+    give the method's `2 log(x_{i-1}* x_{i+1}) / (h_{i-1} + h_i)` up to third order, but without its half-turn limit.
 
     Args:
         path: at least two different poses.
-        knots: see `knots_of`; with "length" repeated poses are dropped.
+        knots: see `knots_of`; with "length", repeated poses are dropped.
         ends: twist at the ends, "one-sided" (that of the first and the last screw) or "zero" (at rest).
+
+    Raises:
+        BadOption, BadShape: an unknown option, unfit knots, or fewer than two different poses.
     """
-    if ends not in ("one-sided", "zero"):
-        raise BadOption("ends", f"{ends!r} is not one of one-sided, zero")
+    check_choice("ends", ends, ("one-sided", "zero"))
     if isinstance(knots, str) and knots == "length":
         path = PosePath(path.dqs[np.diff(path.lengths(), prepend=-1.0) > REPEAT])
     u = knots_of(path, knots)
@@ -168,9 +177,19 @@ def smooth(path: PosePath, *, knots: str | ArrayLike = "length", ends: str = "on
 def smooth_path(
     path: PosePath, *, knots: str | ArrayLike = "length", per_segment: int = 8, ends: str = "one-sided"
 ) -> PosePath:
-    """Poses on the C1 curve through a path, `per_segment` steps between neighbors; the given poses are among them.
+    """Sample the C1 curve through a path, including the given poses.
 
-    Arguments as in `smooth`; row `k * per_segment` is pose k of the path without repeats.
+    Args:
+        path: at least two different poses.
+        knots: see `knots_of`; with "length", repeated poses are dropped.
+        per_segment: number of steps between neighbors, at least 1.
+        ends: twist at the ends, "one-sided" or "zero"; see `smooth`.
+
+    Returns:
+        Path whose pose `k * per_segment` is pose k of the given path without repeats.
+
+    Raises:
+        BadOption, BadShape: as `smooth`.
     """
     if per_segment < 1:
         raise BadOption("per_segment", f"{per_segment} is not at least 1")
@@ -180,18 +199,20 @@ def smooth_path(
 
 
 def thinned(path: PosePath, tolerance: float, *, meters_per_radian: float = METERS_PER_RADIAN) -> PosePath:
-    """Few poses of a path such that the screws between them stay near it: Douglas-Peucker on the group.
+    """Thin a path such that the screws between the kept poses stay near the path: Douglas-Peucker on the group.
 
     Every pose of the path is within the tolerance of the screw between the kept poses around it, at the same
-    fraction of the length. Ends are kept. Few, but not proved to be the fewest. Left-invariant only.
+    fraction of the path length. Ends are kept. Few poses, not proved to be the fewest. Left-invariant only.
 
     Args:
         path: n poses.
-        tolerance: screw length [m], `sqrt(|dp|^2 + (l theta)^2)`.
-        meters_per_radian: the lever l [m].
+        tolerance: weighted distance [m], `sqrt(|dp|^2 + (l theta)^2)`.
+        meters_per_radian: the lever l [m/rad].
+
+    Raises:
+        BadOption: the tolerance is negative or not a number.
     """
-    if not tolerance >= 0.0:
-        raise BadOption("tolerance", f"{tolerance} is not a number >= 0")
+    check_range("tolerance", tolerance, "[0, inf]")
     lengths = path.lengths(meters_per_radian)
     keep = np.zeros(len(path), dtype=bool)
     keep[[0, -1]] = True
@@ -213,13 +234,13 @@ def _check_knots(knots: np.ndarray, count: int) -> None:
 
 
 def _along(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Body twists (m, 6) of the screws from a to b (m, 8) in unit time, signs as they are."""
-    # halfway it is at most a half turn, so that the shortest motion is the one meant
+    """Return body twists (m, 6) of the screws from a to b (m, 8) in unit time, signs as given."""
+    # the rotation halfway is at most a half turn, so that the shortest motion is the intended one
     return 2.0 * dq.twist_from_dq(dq.sclerp(dq.identity(), dq.mul(dq.conj(a), b), 0.5, shortest=False))
 
 
 def _twist_between(a: np.ndarray, xi_a: np.ndarray, b: np.ndarray, xi_b: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Body twist (m, 6) of `S(tau; a, b)` by tau while a and b move with body twists xi_a and xi_b (m, 6).
+    """Return the body twist (m, 6) of `S(tau; a, b)` by tau while a and b move with body twists xi_a and xi_b (m, 6).
 
     With z = a* b, L = log z and J the right Jacobian of exp: `Ad(z^-tau) xi_a + L + tau J(tau L) L'`,
     `L' = J(L)^-1 (xi_b - Ad(z*) xi_a)`.
@@ -233,7 +254,7 @@ def _twist_between(a: np.ndarray, xi_a: np.ndarray, b: np.ndarray, xi_b: np.ndar
 
 
 def _carried(x: np.ndarray, twists: np.ndarray) -> np.ndarray:
-    """Adjoint `x xi x*` of twists (m, 6)."""
+    """Return the adjoint `x xi x*` of twists (m, 6)."""
     zero = np.zeros((len(twists), 1))
     pure = np.concatenate([zero, twists[:, 3:], zero, twists[:, :3]], axis=1)
     out = dq.mul(dq.mul(x, pure), dq.conj(x))
@@ -241,7 +262,7 @@ def _carried(x: np.ndarray, twists: np.ndarray) -> np.ndarray:
 
 
 def _exp_jacobian(twists: np.ndarray) -> np.ndarray:
-    """Right Jacobian (m, 6, 6) of exp at twists (m, 6): `sum_k (-ad)^k / (k + 1)!`."""
+    """Return the right Jacobian (m, 6, 6) of exp at twists (m, 6): `sum_k (-ad)^k / (k + 1)!`."""
     v, w = (np.cross(np.eye(3), part[:, None, :]) for part in (twists[:, :3], twists[:, 3:]))
     ad = np.block([[w, v], [np.zeros_like(w), w]])
     out = np.broadcast_to(np.eye(6), ad.shape)

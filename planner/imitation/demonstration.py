@@ -1,4 +1,4 @@
-"""A demonstration: one recorded motion of a tool, cut into segments, with what each segment refers to."""
+"""A demonstration: one recorded motion of a tool, cut into segments with their reference objects."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ ROBOTS = {
     "Jaco": (7,),
     "XArm7": (7,),
 }
-"""Robots that a demonstration may come from, with how many joints are recorded: Baxter's of one arm or of both."""
+"""Robots a demonstration may come from, with the allowed numbers of recorded joints: one or both arms of Baxter."""
 FARTHEST = 10.0
-"""Positions beyond this [m] are in another unit than metres."""
+"""Largest plausible coordinate [m]; larger positions are not in meters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,10 @@ class Segment:
         name: unique among the segments, like "approach" or "transfer".
         start: first sample.
         stop: last sample, included.
-        reference: name of the object that the end of the motion is relative to, "" for the world.
+        reference: name of the object the end of the motion is relative to, "" for the world.
         reference_pose: that object's pose in the world at the end of the motion.
         held: name of the object in the hand, "" if the hand is empty.
-        gripper: what the gripper does at the end: "close", "open" or "none".
+        gripper: action of the gripper at the end: "close", "open" or "none".
     """
 
     name: str
@@ -57,20 +57,20 @@ class Demonstration:
 
     Attributes:
         name: for messages and reports.
-        task: the task it shows ("stack"), "" if none.
-        robot: whose hand moved.
-        tcp_frame: the frame that `path` records.
+        task: the demonstrated task ("stack"), "" if none.
+        robot: the robot that was recorded, one of `ROBOTS`.
+        tcp_frame: name of the frame recorded in `path`.
         source: "teleoperated", "kinesthetic" or "scripted".
         licence: of the data.
         time: (n,) [s], increasing.
-        path: (n) the tcp in the world.
+        path: n poses of the tcp in the world.
         joint_positions: (n, dof) [rad], None if not recorded.
         gripper: (n,) command, positive closes; None if not recorded.
         segments: the motions, in order.
-        object_sizes: full extents (3,) [m] of the objects that the segments name.
+        object_sizes: full extents (3,) [m] of the objects named in the segments.
 
     Raises:
-        BadDemonstration: naming the field and what is wrong with it.
+        BadDemonstration: an invalid field; the error names the field and the reason.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Demonstration:
             self._check_objects(key, segment)
 
     def _check_objects(self, key: str, segment: Segment) -> None:
-        """The objects that a segment names must be known, where any are, and not in another unit."""
+        """Refuse reference and held objects that are unknown, if objects are listed, and poses in another unit."""
         for role, name in (("reference", segment.reference), ("held", segment.held)):
             if self.object_sizes and name not in ("", *self.object_sizes):
                 allowed = ", ".join(self.object_sizes)
@@ -163,7 +163,7 @@ class Demonstration:
         return array
 
     def _numbers(self, key: str, value: Any) -> np.ndarray:
-        """A float64 copy of real numbers."""
+        """Return a float64 copy of an array of real numbers."""
         array = np.asarray(value)
         if array.dtype.kind not in "fiu":
             raise self._bad(key, f"is not an array of real numbers, but of {array.dtype.name}")
@@ -174,14 +174,14 @@ class Demonstration:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first to the last sample."""
+        """Time [s] from the first to the last sample."""
         return float(self.time[-1] - self.time[0])
 
     def segment(self, name: str) -> Segment:
-        """The segment of a name.
+        """Return the segment with the given name.
 
         Raises:
-            UnknownName: there is none.
+            UnknownName: no segment has the name.
         """
         for segment in self.segments:
             if segment.name == name:
@@ -189,13 +189,17 @@ class Demonstration:
         raise UnknownName(f"segment of {self.name!r}", name, [segment.name for segment in self.segments])
 
     def segment_path(self, name: str) -> PosePath:
-        """The tcp's path during a segment, both ends included."""
+        """Return the path of the tcp during a segment, both ends included.
+
+        Raises:
+            UnknownName: no segment has the name.
+        """
         segment = self.segment(name)
         return self.path[segment.start : segment.stop + 1]
 
 
 def warnings_of(demonstration: Demonstration) -> list[str]:
-    """What a careful reader would want to know before using it; nothing here is an error."""
+    """List peculiarities of a demonstration to know before using it; none of them is an error."""
     found = []
     time, path = demonstration.time, demonstration.path
     for first, last in dwells(time, path):

@@ -1,4 +1,4 @@
-"""Demonstrations as .npz files. Reading never runs code and never expands what was not announced."""
+"""Demonstrations as .npz files. Reading never runs code and never expands more than the announced size."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNIT_QUATERNION = 1e-3
 """Largest deviation of a quaternion's norm that counts as rounding (recordings in single precision, logs with four
 digits); beyond it the numbers are not a quaternion."""
 UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, SyntaxError, RuntimeError, ArithmeticError)
-"""What zipfile, zlib and NumPy raise on damaged files; encrypted or exotic archives are a RuntimeError."""
+"""Errors raised by zipfile, zlib and NumPy on damaged files; encrypted or exotic archives raise a RuntimeError."""
 TEXTS = ("name", "task", "robot", "tcp_frame", "source", "licence", "units")
 REQUIRED = (*TEXTS, "format_version", "time", "poses")
 OPTIONAL = (
@@ -38,7 +38,12 @@ OPTIONAL = (
 
 
 def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
-    """Write a demonstration to an .npz file, which appears when it is complete."""
+    """Write a demonstration to an .npz file; the file appears only when complete.
+
+    Args:
+        demonstration: the demonstration.
+        path: of the file, overwritten if present.
+    """
     demo, segments = demonstration, demonstration.segments
     arrays: dict[str, Any] = {
         "format_version": FORMAT_VERSION,
@@ -69,11 +74,11 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def load_demonstration(path: str | Path) -> Demonstration:
-    """Read a demonstration.
+def read_demonstration(path: str | Path) -> Demonstration:
+    """Read a demonstration from an .npz file.
 
     Raises:
-        BadDemonstration: the file or one of its entries cannot be used; the message names it.
+        BadDemonstration: the file or one of its entries is invalid; the error names the entry.
     """
     path = Path(path)
     arrays = read_arrays(path)
@@ -108,7 +113,15 @@ def load_demonstration(path: str | Path) -> Demonstration:
 
 
 def read_arrays(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]:
-    """All arrays of an .npz file, after its headers have been checked: no objects, no duplicates, no bombs."""
+    """Read all arrays of an .npz file after checking its headers: no objects, no duplicates, no zip bombs.
+
+    Args:
+        path: of the file.
+        max_bytes: largest total size of the expanded arrays [bytes].
+
+    Raises:
+        BadDemonstration: the file is missing, unreadable, too large or contains other entries than plain arrays.
+    """
     if not path.is_file():
         raise BadDemonstration(path, "file", "does not exist")
     try:
@@ -132,7 +145,7 @@ def read_arrays(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]
 
 
 def _announced_bytes(path: Path, archive: zipfile.ZipFile, name: str) -> int:
-    """Size of an entry from its header alone."""
+    """Return the size of an entry [bytes] from its header alone."""
     with archive.open(name) as file:
         version = np.lib.format.read_magic(file)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -144,7 +157,16 @@ def _announced_bytes(path: Path, archive: zipfile.ZipFile, name: str) -> int:
 
 
 def unit_poses(path: Path | str, key: str, value: np.ndarray) -> np.ndarray:
-    """Pose vectors (n, 7) with quaternions normalized, if they are unit up to rounding."""
+    """Return pose vectors (n, 7) with normalized quaternions.
+
+    Args:
+        path: of the file, for messages.
+        key: of the array, for messages.
+        value: (n, 7): x y z [m], then quaternion wxyz, unit up to rounding.
+
+    Raises:
+        BadDemonstration: another shape, a number that is not finite, or a quaternion that is not unit.
+    """
     poses = numbers(path, key, value, 2)
     if poses.shape[1] != 7:
         raise BadDemonstration(path, key, f"has shape {poses.shape}; expected (n, 7): x y z [m], quaternion wxyz")
@@ -172,10 +194,16 @@ def _texts(path: Path, key: str, value: np.ndarray) -> list[str]:
 
 
 def numbers(path: Path | str, key: str, value: np.ndarray, dimensions: int) -> np.ndarray:
-    """The array as float64, if it holds finite real numbers and has that many dimensions.
+    """Return an array of finite real numbers as float64.
+
+    Args:
+        path: of the file, for messages.
+        key: of the array, for messages.
+        value: the array.
+        dimensions: required number of dimensions.
 
     Raises:
-        BadDemonstration: naming the file, the key and the index.
+        BadDemonstration: anything else; the error names the file, the key and the index.
     """
     if value.dtype.kind not in "fiu" or value.ndim != dimensions:
         raise BadDemonstration(path, key, f"is not an array of numbers with {dimensions} dimension(s)")

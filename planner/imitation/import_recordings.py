@@ -1,4 +1,4 @@
-"""Raw recordings of people moving robots, made into demonstrations."""
+"""Import of raw recordings of human-guided robots as demonstrations."""
 
 from __future__ import annotations
 
@@ -19,20 +19,23 @@ CUBES = {"cubeA": (0.04, 0.04, 0.04), "cubeB": (0.05, 0.05, 0.05)}
 """Full extents [m] of the cubes of robosuite 1.0's Stack task."""
 TELEOPERATION_KEYS = ("t", "q", "actions", "obj_cubeA_jnt0", "obj_cubeB_jnt0")
 REST = 0.005
-"""A piece of a recording that moves less than this screw length [m] is standing still."""
+"""Path length [m] below which a piece of a recording counts as standing still."""
 
 
 def stack_from_teleoperation(path: str | Path, arm: Arm, *, name: str, licence: str) -> Demonstration:
-    """The stacking of one cube on another from a teleoperation of robosuite 1.0's Stack task.
+    """Import the stacking of one cube on another from a teleoperation of robosuite 1.0's Stack task.
 
-    The hand's path is the joint encoders through forward kinematics, the gripper is the recorded command, the
-    objects are as recorded: the frame of a cube is kept, it is up to a policy how another object matches it.
+    The hand's path comes from the joint encoders by forward kinematics, the gripper from the recorded command; the
+    object frames are those recorded: matching them to other objects is the task of a policy.
 
     Args:
-        path: .npz with `t` (n,), `q` (n, >= dof), `actions` (n, k) with the gripper last, `obj_*` (n, 7).
-        arm: the robot that was recorded, standing where it stood.
+        path: .npz with `t` (n,) [s], `q` (n, >= dof) [rad], `actions` (n, k) with the gripper last, `obj_*` (n, 7).
+        arm: the recorded robot, with its recorded base pose.
         name: name of the demonstration.
         licence: of the data.
+
+    Raises:
+        BadDemonstration: the file or one of its entries is invalid.
     """
     path = Path(path)
     arrays = read_arrays(path)
@@ -89,17 +92,21 @@ def from_pose_table(
     source: str = "kinesthetic",
     licence: str = "unknown",
 ) -> Demonstration:
-    """A demonstration from rows of `x y z` and a quaternion, at equal time steps; cut where the hand rests.
+    """Import rows of `x y z` and a quaternion at equal time steps; segments are cut where the hand rests.
 
     Args:
         path: .npy array (n, 7) or .csv with 7 columns, with or without a header line.
         name: name of the demonstration.
-        robot: whose hand moved.
+        robot: the robot that was recorded.
         rate: samples per second.
         units: of the positions: "m", "cm" or "mm".
         quaternion: order of the quaternion's columns: "wxyz" or "xyzw".
         source: "teleoperated", "kinesthetic" or "scripted".
         licence: of the data.
+
+    Raises:
+        UnknownName: another unit or quaternion order.
+        BadDemonstration: the file or one of its entries is invalid.
     """
     path = Path(path)
     if units not in METERS:
@@ -140,7 +147,7 @@ def _table(path: Path) -> np.ndarray:
 
 
 def _moving_pieces(hand: PosePath, rests: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Sample ranges between the rests that really move."""
+    """Return the sample ranges between rests, without those that stand still."""
     edges = [0, *(edge for rest in rests for edge in rest), len(hand) - 1]
     lengths = hand.lengths()
     pairs = zip(edges[::2], edges[1::2], strict=True)

@@ -1,4 +1,4 @@
-"""Cutting a recording into motions, and cleaning what a human hand leaves in them."""
+"""Segmentation of a recording into motions, and removal of human artifacts."""
 
 from __future__ import annotations
 
@@ -7,21 +7,28 @@ import numpy as np
 from ..errors import BadOption
 from ..geometry import dualquat as dq
 from ..geometry.pose import PosePath
+from ..ranges import check_range
 
 DWELL_SPEED = 0.05
-"""Fraction of the median speed below which the hand rests."""
+"""Fraction of the median speed below which the hand counts as resting."""
 DWELL_SECONDS = 0.3
+"""Shortest duration of a rest [s]."""
 SAME = 1e-9
-"""Screw length [m] below which two poses are one."""
+"""Path length [m] below which two poses count as equal."""
 
 
 def gripper_events(gripper: np.ndarray) -> np.ndarray:
-    """Last sample (k,) before each change of the gripper command (n,), whose sign counts."""
+    """Return the last sample (k,) before each sign change of the gripper command (n,)."""
     return np.flatnonzero(np.diff(np.sign(gripper)) != 0)
 
 
 def dwells(time: np.ndarray, path: PosePath) -> list[tuple[int, int]]:
-    """Sample ranges, both ends included, in which the hand rests for longer than 0.3 s."""
+    """Find the rests of a path: sample ranges, both ends included, slow for longer than 0.3 s.
+
+    Args:
+        time: (n,) [s].
+        path: n poses.
+    """
     steps = np.diff(path.lengths())
     speed = steps / np.diff(time)
     moving = speed[steps > SAME]
@@ -34,13 +41,19 @@ def dwells(time: np.ndarray, path: PosePath) -> list[tuple[int, int]]:
 
 
 def resampled(path: PosePath, step: float) -> PosePath:
-    """The path in equal steps of screw length along it, at most `step` [m]; both ends are kept exactly.
+    """Resample a path at equal steps of path length; both ends are kept exactly.
 
-    Pauses and trembling no longer weigh in rules that count poses. Poses in between lie on the screw between
+    Removes the weight of pauses and trembling from rules that count poses. Poses in between lie on the screw between
     their two neighbors: nothing is smoothed.
+
+    Args:
+        path: the path.
+        step: largest step [m] of path length.
+
+    Raises:
+        BadOption: the step is not positive.
     """
-    if not step > 0:
-        raise BadOption("step", f"{step} is not a positive length")
+    check_range("step", step, "(0, inf]")
     lengths = path.lengths()
     keep = np.concatenate([[True], np.diff(lengths) > SAME])
     poses, known = path.dqs[keep], lengths[keep]
@@ -55,9 +68,14 @@ def resampled(path: PosePath, step: float) -> PosePath:
 
 
 def key_poses(path: PosePath, count: int) -> PosePath:
-    """So many poses at equal steps of a path's screw length, on the screws between its own; both ends are kept.
+    """Return poses at equal steps of path length, on the screws between a path's poses; both ends are kept exactly.
 
-    Two of a path that stands still.
+    Args:
+        path: the path.
+        count: number of poses, at least 2; a path that stands still gives 2.
+
+    Raises:
+        BadOption: a count below 2.
     """
     if count < 2:
         raise BadOption("count", f"{count} is not a number of poses from 2 on")
@@ -73,9 +91,9 @@ def key_poses(path: PosePath, count: int) -> PosePath:
 
 
 def trimmed(path: PosePath, radius: float) -> PosePath:
-    """The path up to its first entry into a ball about its last position, then its last pose.
+    """Cut a path at its first entry into a ball about its last position, then append its last pose.
 
-    Cuts what people do at the very end: lowering too far, shifting, rising. Only positions count: the
+    Removes human artifacts at the very end: lowering too far, shifting, rising. Only positions count: the
     orientation may settle later.
 
     Args:

@@ -1,7 +1,7 @@
-"""Task-space imitation (TSIA): one demonstrated path carried to a new start and a new goal.
+"""Task-space imitation (TSIA): one demonstrated path transferred to a new start and a new goal.
 
-The imitated path is the demonstration moved rigidly so that it ends at the goal; the final path blends from
-the start to a guiding pose on it along one screw, and then is the imitated path. Paper: section III.
+The imitated path is the demonstrated path moved rigidly so that it ends at the goal; the final path follows one screw
+from the start to a guiding pose on the imitated path, then the imitated path. Paper: section III.
 """
 
 from __future__ import annotations
@@ -13,25 +13,35 @@ import numpy as np
 from ..errors import BadOption
 from ..geometry import dualquat as dq
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
+from ..ranges import check_range
 
 STILL = 1e-9
-"""A path whose screw length [m] is not above this stands still: what there is of it is rounding."""
+"""Path length [m] up to which a path stands still: any motion is rounding."""
 BLEND_STEP, LEAST_STEP = 0.005, 1e-5
-"""Screw length [m] between the poses of a blend into a path that stands still, and the least into any other."""
+"""Path length [m] between the poses of a blend into a path that stands still; the minimum for any other path."""
 GUIDE_START = 0.2
 """Fraction of the imitated path where blending ends; the value of the paper's experiments."""
 
 
 def transfer_to(demonstrated: PosePath, goal: Pose) -> Pose:
-    """The displacement `g = x_f d_n*` that carries the demonstrated path to the goal."""
+    """Return the displacement `g = x_f d_n*` that moves the end of the demonstrated path to the goal.
+
+    Args:
+        demonstrated: the demonstrated path d.
+        goal: pose x_f.
+    """
     return goal @ demonstrated[-1].inverse()
 
 
 def imitated_path(demonstrated: PosePath, goal: Pose) -> PosePath:
-    """The demonstrated path moved rigidly so that it ends at the goal; every relative motion is kept.
+    """Move the demonstrated path rigidly so that it ends at the goal; every relative motion is preserved.
 
-    Constraints in frames of the goal object are kept; constraints against gravity are kept if and only if
+    Constraints in frames of the goal object are preserved; constraints against gravity are preserved if and only if
     the tilt of `transfer_to(...)` is zero. Paper: eq. (5) and (6), which are this one product.
+
+    Args:
+        demonstrated: the demonstrated path.
+        goal: of the last pose, reached exactly.
     """
     moved = demonstrated.moved(transfer_to(demonstrated, goal))
     # the product of d_n with its own inverse is 1 only up to rounding
@@ -40,17 +50,19 @@ def imitated_path(demonstrated: PosePath, goal: Pose) -> PosePath:
 
 
 def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "length") -> int:
-    """Index of the guiding pose, at which blending into the path ends.
+    """Return the index of the guiding pose, where blending into the path ends.
 
     Args:
         path: the imitated path.
         fraction: in [0, 1] of the path from its start.
-        by: "length" (screw length: left-invariant) or "index" (invariant to both world and tool changes).
+        by: "length" (path length: left-invariant) or "index" (invariant to both world and tool changes).
 
-    Paper: "20 % to 70 % of the length" without saying of which metric, nor from which end.
+    Raises:
+        BadOption: a fraction outside [0, 1], or another `by`.
+
+    Paper: "20 % to 70 % of the length" without specifying the metric or the end it is measured from.
     """
-    if not 0.0 <= fraction <= 1.0:
-        raise BadOption("fraction", f"{fraction} is not in [0, 1]")
+    check_range("fraction", fraction, "[0, 1]")
     last = len(path) - 1
     if by == "index":
         index = math.ceil(fraction * last)
@@ -63,7 +75,13 @@ def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "len
 
 
 def screw_path(start: Pose, end: Pose, step: float) -> PosePath:
-    """Poses along the screw from start to end, both included, at most `step` [m] of screw length apart."""
+    """Sample the screw from one pose to another, both included.
+
+    Args:
+        start: first pose.
+        end: last pose.
+        step: largest path length [m] between neighbors.
+    """
     twist = dq.twist_from_dq(dq.mul(dq.conj(start.dq), end.dq))
     length = math.hypot(np.linalg.norm(twist[:3]), METERS_PER_RADIAN * np.linalg.norm(twist[3:]))
     tau = np.linspace(0.0, 1.0, max(1, math.ceil(length / step)) + 1)
@@ -73,12 +91,12 @@ def screw_path(start: Pose, end: Pose, step: float) -> PosePath:
 
 
 def final_path(start: Pose, imitated: PosePath, guide: int) -> PosePath:
-    """One screw from the start to the guiding pose, then the imitated path: begins and ends exactly.
+    """Join one screw from the start to the guiding pose and the imitated path; both ends are exact.
 
     Args:
-        start: where the tcp is.
+        start: present pose of the tcp.
         imitated: the imitated path.
-        guide: index of the guiding pose in it.
+        guide: index of the guiding pose in the imitated path.
     """
     length = imitated.lengths()[-1]
     step = max(length / (len(imitated) - 1), LEAST_STEP) if length > STILL else BLEND_STEP
@@ -88,14 +106,14 @@ def final_path(start: Pose, imitated: PosePath, guide: int) -> PosePath:
 
 
 def departure(demonstrated: PosePath, start: Pose, length: float) -> PosePath:
-    """How the demonstration leaves its beginning, done from the start: `x_0 d_1* d_j`.
+    """Imitate the beginning of a demonstration from the start: `x_0 d_1* d_j`.
 
     Args:
         demonstrated: the segment whose beginning is imitated; `reversed()` of a segment gives the withdrawal.
-        start: where the tcp is.
-        length: screw length [m] to keep.
+        start: present pose of the tcp.
+        length: path length [m] of the beginning.
 
-    Not in the paper: goal-anchored imitation forgets the lift and the withdrawal, and drags what it holds.
+    Not in the paper: goal-anchored imitation loses the lift and the withdrawal, and drags the held object.
     """
     count = int(np.searchsorted(demonstrated.lengths(), length, side="right"))
     part = demonstrated[: max(1, count)]
@@ -103,15 +121,20 @@ def departure(demonstrated: PosePath, start: Pose, length: float) -> PosePath:
 
 
 def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
-    """Imitation anchored at both ends: the beginning as shown from the start, the end as shown to the goal.
+    """Imitate with both ends anchored: the demonstrated beginning from the start, the demonstrated end to the goal.
 
     Meets both ends and is the demonstration itself where the start fits the goal. The weight between the
-    two is a smooth step over the screw length. Not in the paper.
+    two is a smooth step over the path length. Not in the paper.
+
+    Args:
+        demonstrated: the demonstrated path.
+        start: first pose of the result.
+        goal: last pose of the result.
     """
     from_start = demonstrated.moved(start @ demonstrated[0].inverse())
     to_goal = imitated_path(demonstrated, goal)
     lengths = demonstrated.lengths()
     s = lengths / lengths[-1] if lengths[-1] > STILL else np.linspace(0.0, 1.0, len(demonstrated))
-    # one way round for the whole path: the scalar part between the two is the same at every pose
+    # one sense of rotation for the whole path: the scalar part between the two is equal at every pose
     sign = 1.0 if dq.mul(dq.conj(from_start.dqs[0]), to_goal.dqs[0])[0] >= 0.0 else -1.0
     return PosePath(dq.sclerp(from_start.dqs, sign * to_goal.dqs, s * s * (3.0 - 2.0 * s), shortest=False))

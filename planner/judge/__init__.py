@@ -1,1 +1,1 @@
-"""Certificates: an independent check that shares no query with the planner."""
+"""Certificates: independent verification of motions that shares no query with the planner."""

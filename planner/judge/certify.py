@@ -1,7 +1,7 @@
-"""The judge of plans and executed motions: recomputes all that is claimed of them, by other means.
+"""The judge of plans and executed motions: recomputes every claim by independent means.
 
-Distances come from fcl, kinematics from Pinocchio, and what happens between samples from `judge_sweep`. Not judged:
-the arm against itself, whether the capsules hold the true arm, and dynamics.
+Distances come from fcl, kinematics from Pinocchio, and bounds between samples from `sweep`. Not judged: self-collision
+of the arm, whether the capsules contain the real arm, and dynamics.
 """
 
 from __future__ import annotations
@@ -15,38 +15,38 @@ from pathlib import Path
 import numpy as np
 
 from ..log.motion_log import PROBLEM, MotionLog, content_of, digest_of
-from ..robot.body import FRAME
+from ..robot.body import BODY
 from .deviation import deviation_of
 from .sweep import Sweep, Sweeper, SweepSettings
 
 FORMAT_VERSION = 1
 POSITION_ERROR, ANGLE_ERROR = 0.005, 0.05
-"""A goal is reached within these [m], [rad], or within the claimed errors if they are smaller."""
+"""Largest errors [m], [rad] of a reached goal; smaller claimed errors apply instead."""
 SPEED_EXCESS = 1e-6
-"""Relative; rounding."""
+"""Relative tolerance of joint speeds, for rounding."""
 CLAIM_GAP = 1e-5
-"""A claimed clearance [m] is proven up to this: the last micrometers take too many halvings."""
+"""Tolerance [m] in proving a claimed clearance: the last micrometers take too many halvings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What a judge found in a motion.
+    """The findings of a judge about a motion.
 
     Attributes:
-        ok: it is as it must be and as it is claimed to be.
-        reasons: what is wrong, one line each; empty if ok.
-        clearance: smallest distance [m] of the body to the obstacles, between samples too, allowed contacts aside:
-            a certified lower bound (fcl's own rounding, below 1e-7 m, aside), inf if there is nothing to touch.
-        sampled_clearance: smallest distance found [m]; the truth lies between the two.
-        clearances: the certified bound by name of the body's parts.
+        ok: all requirements and all claims hold.
+        reasons: violations, one line each; empty if ok.
+        clearance: smallest distance [m] of the body to the obstacles, also between samples, except allowed contacts:
+            a certified lower bound (up to fcl's own rounding, below 1e-7 m), inf if there are no obstacles.
+        sampled_clearance: smallest distance found [m]; the true clearance lies between the two.
+        clearances: the certified bound [m] by name of the body's parts.
         joint_margin: smallest distance to a joint limit [rad or m]; negative outside.
         speed_ratio: largest joint speed over its limit.
-        position_error: of the last pose to the goal [m]; None: no goal.
-        angle_error: the same [rad].
-        deviation: largest distance (screw length, 0.2 m per rad) of the end of the motion to the demonstrated path
-            [m], both run through in order; None: no path.
+        position_error: of the last pose from the goal [m]; None: no goal.
+        angle_error: of the last pose from the goal [rad]; None: no goal.
+        deviation: largest weighted distance of the motion's end to the demonstrated path [m] (see `deviation`), both
+            traversed in order; None: no path.
         deviation_gap: the true deviation is smaller by at most this [m].
-        intervals: pairs of a capsule and an obstacle over an interval that were looked at.
+        intervals: number of examined pairs of a capsule and an obstacle over an interval.
         log_sha256: digest of the log.
     """
 
@@ -65,12 +65,12 @@ class Certificate:
     log_sha256: str
 
     def to_json(self) -> str:
-        """As JSON; infinite numbers are null."""
+        """Return the certificate as JSON text; infinite numbers become null."""
         table = {"format_version": FORMAT_VERSION, **asdict(self)}
         return json.dumps(_finite(table), allow_nan=False, indent=1)
 
     def write(self, path: str | Path) -> None:
-        """Write it to a JSON file."""
+        """Write the certificate to a JSON file."""
         Path(path).write_text(self.to_json() + "\n", encoding="utf-8")
 
 
@@ -85,13 +85,13 @@ def certify(
 
     Args:
         log: the motion and its claims.
-        expected: a log whose problem (arm, body, obstacles, allowed, goal, safety, and demonstrated if it has one)
-            must be this one's, whatever its own motion; None: the log's problem is taken as it is.
+        expected: a log whose problem (arm, body, obstacles, allowed, goal, safety, and demonstrated if present) must
+            equal the judged log's problem, whatever its own motion; None: any problem.
         tolerance: [m], [rad] by which distances may be too small and claims too good.
-        settings: how closely to look between samples.
+        settings: resolution of the examination between samples; default: `SweepSettings()`.
 
     Returns:
-        What was found, in every case: a motion that is refused is no error.
+        The findings, in every case: a rejected motion is not an error.
     """
     required = _required(log)
     claimed = log.claims.get("clearance", -math.inf)
@@ -130,15 +130,15 @@ def certify(
 
 
 def _required(log: MotionLog) -> np.ndarray:
-    """(m, k) distances to keep [m]; -inf for contacts that are allowed, and between what both stand still for ever.
+    """Return required distances (m, k) [m]; -inf for allowed contacts and between the base and standing obstacles.
 
-    The base cannot run into an obstacle that does not move: where it stands is not a matter of a motion.
+    The base cannot run into a standing obstacle: its place is not part of a motion.
     """
     margins = [log.safety if o.margin is None else o.margin for o in log.obstacles]
     out = np.tile(np.array(margins, dtype=np.float64), (len(log.body), 1))
     for k, mine in enumerate(log.body.names):
         for o, obstacle in enumerate(log.obstacles):
-            fixed = log.body.rows[k, FRAME] < 0 and not obstacle.velocity.any()
+            fixed = log.body.rows[k, BODY.frame] < 0 and not obstacle.velocity.any()
             if fixed or (mine, obstacle.name) in log.allowed:
                 out[k, o] = -math.inf
     return out
@@ -154,7 +154,7 @@ def _by_name(log: MotionLog, sweep: Sweep) -> dict[str, float]:
 
 
 def _speed_ratios(log: MotionLog) -> np.ndarray:
-    """(n - 1, dof); inf where a joint moves in no time."""
+    """Return the ratios (n - 1, dof) of joint speeds to their limits; inf where a joint moves in zero time."""
     dq, dt = np.abs(np.diff(log.joints, axis=0)), np.diff(log.time)[:, None]
     ratios = np.where(dq > 0, math.inf, 0.0)
     return np.divide(dq, dt * log.arm.velocity_limits, out=ratios, where=np.broadcast_to(dt > 0, dq.shape))

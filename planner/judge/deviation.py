@@ -1,7 +1,7 @@
-"""How far the end of a motion strays from the path that it should have kept.
+"""Deviation of the end of a motion from its demonstrated path.
 
-Not in the paper. The measure is the Frechet distance: both curves are run through in order, so that going another
-way, leaving out a part or going back counts. Where the kept end begins is chosen in the motion's favor. Executed
+Not in the paper. The measure is the Frechet distance: both curves are traversed in order, so that another route, an
+omitted part or a reversal counts. The start of the compared end is chosen in the motion's favor. Executed
 motions are linear in the joints between samples, demonstrated paths screw motions between poses.
 """
 
@@ -13,17 +13,24 @@ from ..log.motion_log import MotionLog
 from .geometry import Kinematics
 
 METERS_PER_RADIAN = 0.2
-"""Lever [m] that turns an angle into a length."""
+"""Lever [m/rad] of the weighted distance; repeated here to be independent of the planner."""
 COARSE, FINE = 5e4, 5e5
-"""Pairs of points compared in the first and in the last pass."""
+"""Numbers of compared pairs of points in the first and in the last pass."""
 FINEST = 1e-4
-"""Points closer than this [m] tell no more."""
+"""Smallest spacing [m] of the points; finer spacing changes nothing."""
 
 
 def deviation_of(kinematics: Kinematics, log: MotionLog) -> tuple[float, float]:
-    """Deviation [m] of a log that has a demonstrated path, and by how much the truth may be smaller [m].
+    """Measure the deviation of a log that has a demonstrated path.
 
-    Points on both curves stand in for them; a coarse pass first finds which part of the motion matters.
+    Points on both curves represent the curves; a coarse pass first finds the relevant part of the motion.
+
+    Args:
+        kinematics: of the log's arm and body.
+        log: the log.
+
+    Returns:
+        Deviation [m], and the largest amount [m] by which the true deviation may be smaller.
     """
     assert log.demonstrated is not None
     path = np.array([pose.matrix for pose in log.demonstrated])
@@ -38,7 +45,7 @@ def deviation_of(kinematics: Kinematics, log: MotionLog) -> tuple[float, float]:
 def _pass(
     kinematics: Kinematics, joints: np.ndarray, tool: np.ndarray, path: np.ndarray, pairs: float
 ) -> tuple[float, np.ndarray, float]:
-    """Deviation, the points of the path that it was compared with, and the widest gap between points."""
+    """Return the deviation [m], the points of the path used for it, and the widest gap between points [m]."""
     displacements = [_steps(tool), _steps(path)]
     spacing = max(
         FINEST, float(np.sqrt(max(displacements[0].sum(), FINEST) * max(displacements[1].sum(), FINEST) / pairs))
@@ -56,16 +63,16 @@ def _pass(
 
 
 def frechet(gaps: np.ndarray) -> float:
-    """Smallest possible largest gap of two runs through points, from any row and the first column to the last of both.
+    """Return the smallest possible largest gap of traversals, from any row and the first column to the last of both.
 
     Args:
-        gaps: (n, m) distances of the points of one curve to those of the other.
+        gaps: (n, m) distances [m] of the points of one curve to those of the other.
     """
     n, m = gaps.shape
     if m == 1:
         return float(gaps[-1, 0])
     flat = np.ascontiguousarray(gaps).ravel()
-    # Diagonals of the table of reachable gaps, each shifted by one row so that there is a row before the first.
+    # Diagonals of the table of reachable gaps, each shifted by one row to make room for a row before the first.
     before, last = np.full(n + 1, np.inf), np.full(n + 1, np.inf)
     for diagonal in range(n + m - 1):
         low, high = max(0, diagonal - m + 1), min(n, diagonal + 1)
@@ -85,7 +92,12 @@ def _vectors(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def screw_gaps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(n, m) screw lengths [m] between poses (n, 4, 4) and (m, 4, 4)."""
+    """Return the weighted distances (n, m) [m] between poses.
+
+    Args:
+        a: (n, 4, 4) homogeneous matrices.
+        b: (m, 4, 4) homogeneous matrices.
+    """
     (p, r), (q, s) = _vectors(a), _vectors(b)
     square = (p * p).sum(axis=1)[:, None] + (q * q).sum(axis=1) - 2.0 * p @ q.T
     chord = np.maximum(0.125 * (6.0 - 2.0 * r @ s.T), 0.0)
@@ -94,6 +106,6 @@ def screw_gaps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _steps(poses: np.ndarray) -> np.ndarray:
-    """(n - 1,) screw lengths [m] from pose to pose."""
+    """Return the weighted distances (n - 1,) [m] from pose to pose."""
     p, r = (np.linalg.norm(np.diff(values, axis=0), axis=1) for values in _vectors(poses))
     return np.hypot(p, 2.0 * METERS_PER_RADIAN * np.arcsin(np.minimum(r / np.sqrt(8.0), 1.0)))

@@ -1,7 +1,7 @@
-"""Where the certifier finds an arm's capsules and their distances: by Pinocchio and by fcl.
+"""The judge's own geometry: placement of an arm's capsules by Pinocchio and their distances by fcl.
 
-Not in the paper: a judge must not share the mistakes of the accused, so nothing here uses the planner's own
-kinematics (`chain`) or distance queries. What both sides read is only the description: arm, body, obstacles.
+Not in the paper: a judge must not share the errors of the judged, so nothing here uses the planner's own
+kinematics (`robot.kinematics`) or distance queries. Both sides share only the description: arm, body, obstacles.
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ import numpy as np
 
 from ..geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
 from ..robot.arm import Arm
-from ..robot.body import FRAME, RADIUS, A, B, Body
+from ..robot.body import BODY, Body
+from ..robot.kinematics import CHAIN, REVOLUTE
 
 UNIT = 1e4
-"""fcl is given tenths of millimeters: it stops at an absolute tolerance, and with meters its distances to cylinders
-come out up to 0.2 mm too long, with this unit less than 1e-7 m (measured)."""
+"""fcl works in tenths of millimeters: it stops at an absolute tolerance, so that distances to cylinders in meters
+are up to 0.2 mm too long, in this unit less than 1e-7 m (measured)."""
 
 
 class Moment(NamedTuple):
-    """Configurations of an arm and where they put it, n of them; world frame.
+    """The arm in n configurations; world frame.
 
     Attributes:
         time: (n,) [s].
-        joints: (n, dof).
+        joints: (n, dof) [rad or m].
         axes: (n, dof, 3) unit vectors along the joints' axes.
         origins: (n, dof, 3) a point on each axis [m].
         ends: (n, m, 2, 3) ends of the capsules' cores [m].
-        turns: (n, m, 3, 3) their rotations, z along the core.
-        tool: (n, 4, 4) of the tcp.
+        turns: (n, m, 3, 3) rotations of the capsules, z along the core.
+        tool: (n, 4, 4) poses of the tcp.
     """
 
     time: np.ndarray
@@ -43,36 +44,41 @@ class Moment(NamedTuple):
     tool: np.ndarray
 
     def at(self, index: Any) -> Moment:
-        """Some of them."""
+        """Select configurations by index, slice or mask."""
         return Moment(*(array[index] for array in self))
 
     def joined(self, other: Moment) -> Moment:
-        """These, then the others."""
+        """Append the configurations of another moment."""
         return Moment(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
 class Kinematics:
-    """An arm and its body in Pinocchio."""
+    """Kinematics of an arm and its body in Pinocchio."""
 
     def __init__(self, arm: Arm, body: Body):
         import pinocchio as pin
 
         self._pin, self._model, parent = pin, pin.Model(), 0
         for k, row in enumerate(arm.chain[:-1]):
-            joint = pin.JointModelRZ() if row[7] == 0.0 else pin.JointModelPZ()
+            joint = pin.JointModelRZ() if row[CHAIN.kind] == REVOLUTE else pin.JointModelPZ()
             parent = self._model.addJoint(parent, joint, self._placement(row), f"joint{k}")
         self._data = self._model.createData()
         self._tool = self._placement(arm.chain[-1]).homogeneous
-        self._frames = body.rows[:, FRAME].astype(int) + 1
-        self._ends = np.stack([body.rows[:, A:B], body.rows[:, B:RADIUS]], axis=1)
+        self._frames = body.rows[:, BODY.frame].astype(int) + 1
+        self._ends = np.stack([body.rows[:, BODY.a : BODY.b], body.rows[:, BODY.b : BODY.radius]], axis=1)
         self._turns = np.array([_turn_of(b - a) for a, b in self._ends]).reshape(-1, 3, 3)
 
     def _placement(self, row: np.ndarray) -> Any:
-        w, x, y, z = row[:4] / np.linalg.norm(row[:4])
-        return self._pin.SE3(self._pin.Quaternion(w, x, y, z).matrix(), row[4:7].copy())
+        w, x, y, z = row[CHAIN.rotation : CHAIN.offset] / np.linalg.norm(row[CHAIN.rotation : CHAIN.offset])
+        return self._pin.SE3(self._pin.Quaternion(w, x, y, z).matrix(), row[CHAIN.offset : CHAIN.kind].copy())
 
     def moment(self, time: np.ndarray, joints: np.ndarray) -> Moment:
-        """The arm at joints (n, dof) and times (n,)."""
+        """Compute the arm's configurations.
+
+        Args:
+            time: (n,) [s].
+            joints: (n, dof) [rad or m].
+        """
         count, dof = joints.shape
         frames = np.zeros((count, dof + 1, 4, 4))
         frames[:, 0] = np.eye(4)
@@ -87,7 +93,15 @@ class Kinematics:
         return Moment(time, joints, axes, origins, ends, turns, frames[:, -1] @ self._tool)
 
     def interpolated(self, path: np.ndarray, fractions: Sequence[np.ndarray]) -> np.ndarray:
-        """Screw motions through poses (k, 4, 4), each step at its own fractions; the last pose included."""
+        """Sample the screw motions through poses.
+
+        Args:
+            path: (k, 4, 4) homogeneous matrices.
+            fractions: k - 1 arrays of fractions in [0, 1), one per step.
+
+        Returns:
+            (n, 4, 4) poses, the last pose of the path included.
+        """
         poses = [self._pin.SE3(pose[:3, :3], pose[:3, 3].copy()) for pose in path]
         steps = zip(poses[:-1], poses[1:], fractions, strict=True)
         dense = [self._pin.SE3.Interpolate(a, b, float(s)) for a, b, at in steps for s in at]
@@ -95,7 +109,7 @@ class Kinematics:
 
 
 def _turn_of(direction: np.ndarray) -> np.ndarray:
-    """A rotation matrix whose z axis is along a vector; any, if that is zero."""
+    """Return a rotation matrix with its z axis along a vector; the identity if the vector is zero."""
     length = np.linalg.norm(direction)
     if length < 1e-12:
         return np.eye(3)
@@ -108,13 +122,13 @@ def _turn_of(direction: np.ndarray) -> np.ndarray:
 class CollisionWorld:
     """Capsules and obstacles in fcl.
 
-    A capsule is asked for by its core alone, as a capsule of radius 0, and the radius taken off afterwards: this is
-    exact as deep as the core stays outside, where fcl's own answers in penetration are not distances.
+    A capsule is queried by its core alone, as a capsule of radius 0, and the radius is subtracted afterwards: exact
+    as long as the core stays outside, whereas fcl's own answers in penetration are not distances.
     """
 
     def __init__(self, body: Body, obstacles: Sequence[Obstacle]):
-        lengths = np.linalg.norm(body.rows[:, B:RADIUS] - body.rows[:, A:B], axis=1)
-        self.radii = body.rows[:, RADIUS]
+        lengths = np.linalg.norm(body.rows[:, BODY.b : BODY.radius] - body.rows[:, BODY.a : BODY.b], axis=1)
+        self.radii = body.rows[:, BODY.radius]
         cores = [fcl.Sphere(0.0) if length < 1e-12 else fcl.Capsule(0.0, length * UNIT) for length in lengths]
         self._cores = [fcl.CollisionObject(core) for core in cores]
         self._obstacles = [_object_of(obstacle) for obstacle in obstacles]
@@ -125,7 +139,15 @@ class CollisionWorld:
         self._boxes = np.array([_box_of(o.shape) for o in obstacles]).reshape(-1, 2, 3)
 
     def distances(self, moment: Moment, cells: np.ndarray) -> np.ndarray:
-        """Distances [m] of cells (c, 3): moment, capsule, obstacle; at worst minus the radius, in penetration."""
+        """Compute distances of capsules to obstacles; at worst minus the radius, in penetration.
+
+        Args:
+            moment: configurations and times.
+            cells: (c, 3) indices: configuration, capsule, obstacle.
+
+        Returns:
+            (c,) distances [m].
+        """
         n, k, o = cells.T
         centers = moment.ends[n, k].mean(axis=1) - moment.time[n, None] * self.velocities[o]
         out = np.empty(len(cells))
@@ -136,7 +158,7 @@ class CollisionWorld:
         return np.maximum(out / UNIT, 0.0) - self.radii[k]
 
     def at_least(self, moment: Moment) -> np.ndarray:
-        """(n, m, k) lower bounds of all distances [m]: of the core's center to a box about the obstacle."""
+        """Return lower bounds (n, m, k) of all distances [m]: from the core's center to a box around the obstacle."""
         a, b = moment.ends[:, :, 0], moment.ends[:, :, 1]
         reach = 0.5 * np.linalg.norm(b - a, axis=-1) + self.radii
         out = np.empty((*reach.shape, len(self._places)))
@@ -148,7 +170,7 @@ class CollisionWorld:
 
 
 def _box_of(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Center and half extents, in the shape's own frame, of a box that holds it."""
+    """Return center and half extents of a box that contains a shape, in the shape's own frame."""
     if isinstance(shape, Mesh):
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         return 0.5 * (low + high), 0.5 * (high - low)
@@ -166,7 +188,7 @@ def _object_of(obstacle: Obstacle) -> Any:
 
 
 def fcl_geometry(shape: Shape) -> Any:
-    """A shape in fcl, in its own frame, its lengths in `UNIT`."""
+    """Return a shape as fcl geometry, in its own frame, with lengths in `UNIT`."""
     if isinstance(shape, Sphere):
         return fcl.Sphere(UNIT * shape.radius)
     if isinstance(shape, Capsule):
@@ -179,7 +201,7 @@ def fcl_geometry(shape: Shape) -> Any:
 
 
 def fcl_convex(vertices: np.ndarray) -> Any:
-    """A convex polyhedron with its triangles turned outwards."""
+    """Return a convex polyhedron with outward triangles, from vertices (n, 3) in `UNIT`."""
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(vertices)

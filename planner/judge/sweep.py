@@ -1,8 +1,8 @@
-"""How near a moving body comes to moving obstacles, between the samples of its motion too.
+"""Clearance of a moving body from moving obstacles, including between the samples of its motion.
 
-Not in the paper. The distance of a capsule to an obstacle changes by no more than the way that the capsule's core
-goes relative to the obstacle. So over an interval with distances D(a) and D(b) at its ends, in which no point of the
-core goes farther than L, the distance is nowhere below (D(a) + D(b) - L) / 2; where that is too little, the
+Not in the paper. The distance of a capsule to an obstacle changes by no more than the displacement of the capsule's
+core relative to the obstacle. So over an interval with distances D(a) and D(b) at its ends, in which no point of the
+core is displaced farther than L, the distance never falls below (D(a) + D(b) - L) / 2; where that is too little, the
 interval is halved.
 """
 
@@ -12,23 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadOption
 from ..log.motion_log import MotionLog
-from ..robot.body import FRAME
+from ..ranges import check_ranges
+from ..robot.body import BODY
+from ..robot.kinematics import CHAIN
 from .geometry import CollisionWorld, Kinematics, Moment
 
 BATCH = 2048
-"""Intervals worked on at once: bounds the memory."""
+"""Number of intervals processed at once: bounds the memory."""
 
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """How closely to look.
+    """Accuracy and effort of a sweep.
 
     Attributes:
         resolution: an interval in which nothing moves farther [m] is not halved.
-        slack: the bound lies at most this far [m] under the smallest distance found, for every name.
-        max_intervals: halves looked at before giving up.
+        slack: largest gap [m] between the bound and the smallest distance found, for every name.
+        max_intervals: largest number of examined intervals before the sweep stops undecided.
     """
 
     resolution: float = 1e-6
@@ -36,21 +37,19 @@ class SweepSettings:
     max_intervals: int = 200_000
 
     def __post_init__(self):
-        for name in ("resolution", "slack", "max_intervals"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise BadOption(name, f"{getattr(self, name)!r} is not a positive number")
+        check_ranges(self, "(0, inf)", "resolution", "slack", "max_intervals")
 
 
 @dataclass
 class Sweep:
-    """What was found, for every capsule and obstacle (m, k).
+    """Result of a sweep, for every capsule and obstacle (m, k).
 
     Attributes:
-        sampled: smallest distances looked at [m], or lower bounds of them where another pair is nearer; inf: never.
+        sampled: smallest computed distances [m], or lower bounds of them where another pair is nearer; inf: never.
         certified: lower bounds of all distances during the motion [m].
-        when: times at which the smallest were found [s].
-        intervals: pairs over an interval that were looked at.
-        complete: the intervals were as many as allowed, or fewer.
+        when: times of the smallest computed distances [s].
+        intervals: number of examined pairs over an interval.
+        complete: True if `max_intervals` sufficed.
     """
 
     sampled: np.ndarray
@@ -67,7 +66,7 @@ class _Batch:
     Attributes:
         a: starts.
         b: ends.
-        cells: (c, 3).
+        cells: (c, 3) indices: interval, capsule, obstacle.
         distances: (c, 2) at the starts and the ends [m].
     """
 
@@ -77,7 +76,7 @@ class _Batch:
     distances: np.ndarray
 
     def part(self, which: slice | np.ndarray) -> _Batch:
-        """Some of the pairs, with their intervals only."""
+        """Select pairs, with their intervals only."""
         cells = self.cells[which]
         used, n = np.unique(cells[:, 0], return_inverse=True)
         cells = np.column_stack([n.ravel(), cells[:, 1:]])
@@ -85,18 +84,18 @@ class _Batch:
 
 
 def travel(kinds: np.ndarray, frames: np.ndarray, a: Moment, b: Moment, shift: np.ndarray) -> np.ndarray:
-    """Bound (c,) [m] on the way that any point of a core goes relative to an obstacle, joints moving linearly.
+    """Bound the displacement (c,) [m] of any point of a core relative to an obstacle, joints moving linearly.
 
-    The smaller of two bounds. Turns: every joint by its own angle, times the largest distance of the point to its
-    axis; that changes only by the joints beyond it, from either end of the interval. Speeds: the trapezoid of the
-    speeds at the ends, plus a quarter of the largest acceleration, |x''| <= sum_ij |dq_i dq_j| r_max(i, j).
+    The smaller of two bounds. Rotations: every joint by its own angle, times the largest distance of the point to the
+    joint's axis; the joints beyond alone change that distance, from either end of the interval. Speeds: the trapezoid
+    of the speeds at the ends, plus a quarter of the largest acceleration, |x''| <= sum_ij |dq_i dq_j| r_max(i, j).
 
     Args:
-        kinds: (dof,) 0 for a joint that turns, 1 for one that slides.
+        kinds: (dof,) 0 for a revolute joint, 1 for a prismatic one.
         frames: (c,) joint that each core moves with, -1 for the base.
-        a: the start of each core's interval; its `ends` (c, 2, 3) are of that core alone.
-        b: the end.
-        shift: (c, 3) displacement of each obstacle.
+        a: start of each core's interval; its `ends` (c, 2, 3) are of that core alone.
+        b: end of each core's interval.
+        shift: (c, 3) displacement of each obstacle [m].
     """
     dq = b.joints - a.joints
     active = np.arange(len(kinds)) <= frames[:, None]
@@ -128,13 +127,13 @@ class Sweeper:
 
         Args:
             log: the motion.
-            required: (m, k) distances to keep [m], -inf for pairs that are not checked.
+            required: (m, k) required distances [m], -inf for pairs that are not checked.
             aim: claimed smallest distance of all [m], -inf for none.
-            settings: how closely to look.
+            settings: accuracy and effort.
         """
         body = log.body
         self._required, self._aim, self._settings = required, aim, settings
-        self._kinds, self._frames = log.arm.chain[:-1, 7], body.rows[:, FRAME].astype(int)
+        self._kinds, self._frames = log.arm.chain[:-1, CHAIN.kind], body.rows[:, BODY.frame].astype(int)
         self._group = np.array([body.names.index(name) for name in body.names], dtype=int)
         self.kinematics, self._scene = Kinematics(log.arm, body), CollisionWorld(body, log.obstacles)
         self.moment = self.kinematics.moment(log.time, log.joints)
@@ -142,7 +141,7 @@ class Sweeper:
         self.found = Sweep(np.full(shape, np.inf), np.full(shape, np.inf), np.full(shape, log.time[0]))
 
     def run(self) -> Sweep:
-        """Look at the samples, then between them until all is decided."""
+        """Examine the samples, then the intervals between them until everything is decided."""
         if not self._required.size:
             return self.found
         stack = self._between(*self._samples())
@@ -163,7 +162,10 @@ class Sweeper:
         found.when[k[nearest], o[nearest]] = times[nearest]
 
     def _samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Distances (n, m, k) at the samples, or lower bounds, and which are exact: all that may be the smallest."""
+        """Return distances (n, m, k) [m] at the samples, or lower bounds, and a mask of the exact ones.
+
+        Every distance that may be the smallest is exact.
+        """
         out = self._scene.at_least(self.moment)
         out[:, ~np.isfinite(self._required)] = np.inf
         exact = np.zeros(out.shape, dtype=bool)
@@ -188,7 +190,7 @@ class Sweeper:
         return out[n, k, o].min()
 
     def _targets(self, cells: np.ndarray) -> np.ndarray:
-        """Bounds (c,) to reach: what is required and claimed, if it is still true, and close to what was found."""
+        """Return bounds (c,) [m] to reach: those required and claimed if still true, and near the distance found."""
         _, k, o = cells.T
         sampled = self.found.sampled
         by_group = np.full(len(self._group), np.inf)
@@ -199,7 +201,7 @@ class Sweeper:
         return np.where(sampled[k, o] < self._required[k, o], close, np.maximum(wanted, close))
 
     def _between(self, distances: np.ndarray, exact: np.ndarray) -> list[_Batch]:
-        """The intervals between the samples, with the pairs that a coarse bound leaves open."""
+        """Return the intervals between the samples, with the pairs that a coarse bound leaves open."""
         a, b = self.moment.at(slice(None, -1)), self.moment.at(slice(1, None))
         displacements, still = np.empty((len(a.time), len(self._frames))), np.zeros((len(a.time), 3))
         for k, frame in enumerate(self._frames):
@@ -223,7 +225,7 @@ class Sweeper:
         np.minimum.at(self.found.certified, tuple(cells[:, 1:].T), bounds)
 
     def _settle(self, batch: _Batch) -> np.ndarray:
-        """Which pairs of a batch are decided; their bounds go into the result."""
+        """Return which pairs of a batch are decided, and enter their bounds into the result."""
         n, k, o = batch.cells.T
         a, b, row = batch.a.at(n), batch.b.at(n), np.arange(len(n))
         shift = self._scene.velocities[o] * (b.time - a.time)[:, None]
@@ -239,7 +241,7 @@ class Sweeper:
         return done
 
     def _halved(self, batch: _Batch) -> list[_Batch]:
-        """What a batch leaves open, its intervals halved."""
+        """Return the open pairs of a batch with their intervals halved."""
         left = ~self._settle(batch)
         if not left.any():
             return []

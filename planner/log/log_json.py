@@ -1,6 +1,6 @@
 """Arms, bodies, obstacles and poses as JSON, both ways.
 
-Poses are unit dual quaternions (8 numbers, see `dualquat`), which go through a file without losing a bit; infinite
+Poses are unit dual quaternions (8 numbers, see `dualquat`), which JSON preserves bit by bit; infinite
 joint limits are null.
 """
 
@@ -23,11 +23,11 @@ from ..strict_json import Refused, list_of, number_of, numbers_of, table_of, tex
 SHAPES: dict[str, type] = {"sphere": Sphere, "capsule": Capsule, "box": Box, "cylinder": Cylinder, "mesh": Mesh}
 ROUND = ("radius", "length")
 SIZES = {"sphere": ("radius",), "capsule": ROUND, "box": ("size",), "cylinder": ROUND, "mesh": ("vertices",)}
-"""What a shape is made of, by its kind."""
+"""Size fields of a shape, by its kind."""
 
 
 def content_of_arm(arm: Arm) -> dict[str, Any]:
-    """An arm as JSON."""
+    """Return an arm as JSON content."""
     return {
         "name": arm.name,
         "joint_names": list(arm.joint_names),
@@ -39,13 +39,13 @@ def content_of_arm(arm: Arm) -> dict[str, Any]:
 
 
 def content_of_body(body: Body) -> dict[str, Any]:
-    """A body as JSON."""
+    """Return a body as JSON content."""
     return {"rows": body.rows.tolist(), "names": list(body.names), "held": list(body.held)}
 
 
 @contextmanager
 def _blaming(key: str) -> Iterator[None]:
-    """Errors of what is built inside name the key that it was built from."""
+    """Raise errors of the enclosed construction as errors of the given key."""
     try:
         yield
     except Refused:
@@ -55,19 +55,39 @@ def _blaming(key: str) -> Iterator[None]:
 
 
 def pose_of(key: str, value: Any) -> Pose:
-    """A pose from its 8 numbers."""
+    """Parse a pose.
+
+    Args:
+        key: for messages.
+        value: 8 numbers.
+
+    Raises:
+        Refused: anything else.
+    """
     with _blaming(key):
         return Pose(numbers_of(key, value, (8,)))
 
 
 def path_of(key: str, value: Any) -> PosePath:
-    """A path from lists of 8 numbers."""
+    """Parse a path.
+
+    Args:
+        key: for messages.
+        value: n lists of 8 numbers.
+
+    Raises:
+        Refused: anything else.
+    """
     with _blaming(key):
         return PosePath(numbers_of(key, value, (None, 8)))
 
 
 def arm_of(value: Any) -> Arm:
-    """An arm from its table."""
+    """Parse an arm from its table.
+
+    Raises:
+        Refused: anything else.
+    """
     table = table_of("arm", value, ("name", "joint_names", "chain", "lower", "upper", "velocity_limits"))
     names = texts_of("arm.joint_names", table["joint_names"])
     with _blaming("arm"):
@@ -87,7 +107,11 @@ def _limits(key: str, value: Any, absent: float) -> np.ndarray:
 
 
 def body_of(value: Any) -> Body:
-    """A body from its table."""
+    """Parse a body from its table.
+
+    Raises:
+        Refused: anything else.
+    """
     table = table_of("body", value, ("rows", "names", "held"))
     with _blaming("body"):
         return Body(
@@ -98,7 +122,7 @@ def body_of(value: Any) -> Body:
 
 
 def content_of_obstacle(obstacle: Obstacle) -> dict[str, Any]:
-    """An obstacle as JSON."""
+    """Return an obstacle as JSON content."""
     kind = next(kind for kind, shape in SHAPES.items() if isinstance(obstacle.shape, shape))
     sizes = {key: np.asarray(getattr(obstacle.shape, key)).tolist() for key in SIZES[kind]}
     return {
@@ -111,7 +135,15 @@ def content_of_obstacle(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def obstacle_of(key: str, value: Any) -> Obstacle:
-    """An obstacle from its table."""
+    """Parse an obstacle.
+
+    Args:
+        key: for messages.
+        value: table as written by `content_of_obstacle`.
+
+    Raises:
+        Refused: anything else.
+    """
     table = table_of(key, value, ("shape", "pose", "velocity", "name", "margin"))
     margin = table["margin"]
     with _blaming(key):

@@ -1,6 +1,6 @@
-"""Logs of planned or executed motions: all that a judge needs who trusts nobody.
+"""Logs of planned or executed motions: everything an independent verifier needs.
 
-A log is one JSON file, its parts as in `log_parts`; `sha256` is taken over the content, canonically written.
+A log is one JSON file, its parts as in `log_json`; `sha256` is the digest of the canonically written content.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from ..errors import OneDemoError
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
 from ..robot.arm import Arm
-from ..robot.body import FRAME, Body
+from ..robot.body import BODY, Body
+from ..robot.kinematics import CHAIN
 from ..strict_json import Refused, list_of, number_of, numbers_of, parsed, table_of, texts_of
 from .log_json import (
     arm_of,
@@ -34,15 +35,15 @@ from .log_json import (
 FORMAT_VERSION = 1
 MAX_BYTES = 64 * 2**20
 FARTHEST = 1e6
-"""Joints [rad or m], times [s], places [m] and speeds [m/s] above this are mistakes, and would overflow."""
+"""Largest plausible joint value [rad or m], time [s], position [m] or speed [m/s]; larger ones would overflow."""
 CLAIMS = ("clearance", "position_error", "angle_error", "joint_margin", "deviation")
 PROBLEM = ("arm", "body", "obstacles", "allowed", "goal", "safety", "demonstrated")
-"""What was asked; the rest of a log is the answer."""
+"""Keys of the request; the rest of a log is the answer."""
 KEYS = ("format_version", *PROBLEM, "time", "joints", "claims")
 
 
 class BadLog(OneDemoError, ValueError):
-    """A motion log, or the file it comes from, cannot be used."""
+    """A motion log, or its file, is invalid."""
 
     def __init__(self, path: str | Path | None, key: str, reason: str):
         self.path, self.key, self.reason = path, key, reason
@@ -51,24 +52,24 @@ class BadLog(OneDemoError, ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionLog:
-    """A motion of an arm, the world it went through, and what is claimed of it.
+    """A motion of an arm, its surroundings, and the claims about it.
 
     Attributes:
-        arm: whose joints these are.
-        body: capsules on its joints' frames, those of held objects included.
-        obstacles: where they are at time 0; they keep their velocities.
+        arm: the arm that moves.
+        body: capsules on the arm's joint frames, including those of held objects.
+        obstacles: at time 0; they move at constant velocity.
         time: (n,) [s].
         joints: (n, dof) [rad or m]; between samples the motion is linear.
-        safety: distance [m] claimed to be kept from every obstacle that has no margin of its own.
-        goal: pose of the tcp at the end; None: none was asked for.
-        demonstrated: path that the end of the motion should have kept; None: there is none.
-        allowed: (body name, obstacle name) of contacts that are wanted, and so not checked.
-        claims: numbers that the producer claims: clearance, position_error, joint_margin, deviation [m],
-            angle_error [rad]; any of them may be absent.
+        safety: clearance [m] claimed from every obstacle without a margin of its own.
+        goal: requested pose of the tcp at the end; None: no goal.
+        demonstrated: path that the end of the motion should follow; None: no path.
+        allowed: (body name, obstacle name) of intended contacts, which are not checked.
+        claims: claims of the producer: clearance, position_error, joint_margin, deviation [m], angle_error [rad]; each
+            of them may be absent.
         format_version: of the file.
 
     Raises:
-        BadLog: an entry has the wrong shape, is not finite or names what is not there.
+        BadLog: an entry has the wrong shape, is not finite or contains an unknown name.
     """
 
     arm: Arm
@@ -92,9 +93,9 @@ class MotionLog:
             raise BadLog(None, "time", "has no samples")
         places = [[*o.pose.position, *o.velocity] for o in self.obstacles]
         _checked("obstacles", np.array(places).reshape(-1, 6), (None, 6))
-        if np.abs(np.linalg.norm(self.arm.chain[:, :4], axis=1) - 1.0).max() > 1e-6:
+        if np.abs(np.linalg.norm(self.arm.chain[:, CHAIN.rotation : CHAIN.offset], axis=1) - 1.0).max() > 1e-6:
             raise BadLog(None, "arm.chain", "holds a quaternion that is not of unit norm")
-        if len(self.body) and self.body.rows[:, FRAME].max() >= self.arm.dof:
+        if len(self.body) and self.body.rows[:, BODY.frame].max() >= self.arm.dof:
             raise BadLog(None, "body.rows", f"a capsule moves with a joint beyond the {self.arm.dof} of the arm")
         if not 0.0 <= _number("safety", self.safety) <= FARTHEST:
             raise BadLog(None, "safety", f"{self.safety!r} is not a length from 0 on")
@@ -113,7 +114,7 @@ class MotionLog:
 
 
 def content_of(log: MotionLog) -> dict[str, Any]:
-    """The log as JSON knows it, without its digest."""
+    """Return the log as JSON content, without its digest."""
     return {
         "format_version": log.format_version,
         "arm": content_of_arm(log.arm),
@@ -130,7 +131,7 @@ def content_of(log: MotionLog) -> dict[str, Any]:
 
 
 def digest_of(log: MotionLog) -> str:
-    """Sha256 of the content, canonically written."""
+    """Return the SHA-256 digest of the canonically written content."""
     text = json.dumps(content_of(log), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -138,8 +139,12 @@ def digest_of(log: MotionLog) -> str:
 def write_log(log: MotionLog, path: str | Path) -> None:
     """Write a log to a JSON file.
 
+    Args:
+        log: the log.
+        path: of the file, overwritten if present.
+
     Raises:
-        BadLog: it is larger than what `read_log` reads.
+        BadLog: the log is larger than `read_log` accepts.
     """
     text = json.dumps({**content_of(log), "sha256": digest_of(log)}, allow_nan=False)
     if len(text) > MAX_BYTES:
@@ -151,7 +156,7 @@ def read_log(path: str | Path) -> MotionLog:
     """Read a log; every entry is checked, then the digest.
 
     Raises:
-        BadLog: the file or one of its entries cannot be used; the message names both.
+        BadLog: the file or one of its entries is invalid; the message names both.
     """
     try:
         data = parsed(Path(path), MAX_BYTES)
@@ -200,7 +205,7 @@ def _number(key: str, value: Any) -> float:
 
 
 def _checked(key: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """A read-only copy, of this shape, finite and of sensible size."""
+    """Return a read-only copy, checked for its shape and for finite, plausible numbers."""
     try:
         array = np.array(value, dtype=np.float64)
     except (ValueError, TypeError):

@@ -1,4 +1,4 @@
-"""The closed loops that a plan may try, the likeliest first."""
+"""Closed loops that a plan may try, the likeliest first."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .settings import PlanSettings
 
 
 class Attempt(NamedTuple):
-    """A closed loop that may be tried.
+    """A closed loop to try.
 
     Attributes:
-        guide: fraction of the imitated path where the guiding pose is.
+        guide: fraction of the imitated path before the guiding pose.
         bias: of the detours, see `RepetSettings.bias`.
         factor: of the planning margin.
-        early: detours come back to the path at the first pose that they can.
+        early: detours rejoin the path at the first possible pose.
     """
 
     guide: float
@@ -27,7 +27,7 @@ class Attempt(NamedTuple):
 
 
 def attempts(settings: PlanSettings, escapes: list[int]) -> Iterator[Attempt]:
-    """The closed loops that may be tried, the likeliest first.
+    """Yield the closed loops to try, the likeliest first.
 
     Args:
         settings: of the planner.

@@ -1,4 +1,4 @@
-"""A leg of a task in one compiled call: imitate, blend, lead round obstacles, follow with the whole arm kept clear."""
+"""A motion in one compiled call: imitate, blend, detour round obstacles, follow with the whole arm kept clear."""
 
 from __future__ import annotations
 
@@ -7,21 +7,35 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..control.pursuit import restart_pursuit
 from ..escape.detour import ESCAPED, escape, last_tree, write_edge
-from ..escape.escape_tree import tree_arrays
 from ..escape.repet import RepetSettings
+from ..escape.tree_arrays import DETOUR_LOG, tree_arrays
 from ..geometry import screw
 from ..geometry.pose import METERS_PER_RADIAN
 from ..jit import inner, kernel
 from ..safety.guarded_pursuit import guarded_roll_out
 
-IMITATED, GUIDE, FULL, FOLLOWED, LAST, CHANGED, DETOURS, TREE_ROWS = range(8)
-"""What `plan_closed_loop` writes into `counts`: length of the imitated path, guide, length of the path, of the one
-followed, last row of the trace, ticks changed by the safety layer, detours, rows of the last tree."""
+
+class CountColumns(NamedTuple):
+    """Places of the counts that `plan_closed_loop` leaves behind."""
+
+    imitated: int = 0  # poses of the imitated path
+    guide: int = 1  # index of the guiding pose in it
+    full: int = 2  # poses of the path, lead included
+    followed: int = 3  # poses of the path that was followed
+    last: int = 4  # last row of the trace
+    changed: int = 5  # ticks changed by the safety layer
+    detours: int = 6
+    tree_rows: int = 7  # rows of the last escape tree
+    width: int = 8
+
+
+COUNT = CountColumns()
 
 
 class Buffers(NamedTuple):
-    """Arrays that a leg is planned in; made once, used again."""
+    """Work arrays of `plan_closed_loop`; allocated once, used again."""
 
     imitated: np.ndarray
     path: np.ndarray
@@ -42,7 +56,13 @@ class Buffers(NamedTuple):
 
 
 def buffers(settings: RepetSettings, dof: int, ticks: int) -> Buffers:
-    """Arrays for legs of an arm with so many joints and at most so many ticks."""
+    """Allocate the work arrays.
+
+    Args:
+        settings: of the escape trees, whose sizes they set.
+        dof: number of joints.
+        ticks: maximum number of ticks of a motion.
+    """
     tree, cells, heap = tree_arrays(settings.nodes, settings.levels)
     return Buffers(
         imitated=np.zeros((settings.longest, 8)),
@@ -58,9 +78,9 @@ def buffers(settings: RepetSettings, dof: int, ticks: int) -> Buffers:
         heap=heap,
         options=settings.packed(),
         state=np.ones(1),
-        log=np.zeros((settings.rounds, 4)),
+        log=np.zeros((settings.rounds, DETOUR_LOG.width)),
         trace=np.zeros((ticks + 1, dof)),
-        counts=np.zeros(8, dtype=np.int64),
+        counts=np.zeros(COUNT.width, dtype=np.int64),
     )
 
 
@@ -80,7 +100,7 @@ def _imitated(demo, goal, out):
 
 @inner
 def _guide(path, n, fraction):
-    """Index at which so much of the screw length is behind; `tsia.guide_index`."""
+    """Index of the pose at a fraction of the path length; `tsia.guide_index`."""
     total = 0.0
     for k in range(1, n):
         distance, angle = screw.pose_distance(screw.load8(path, k - 1), screw.load8(path, k))
@@ -106,21 +126,21 @@ def _copied(source, first, last, out, at):
 
 @kernel
 def plan_closed_loop(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, b, pursuit_state, wish, out):
-    """Plan a leg: the joints of every tick are left in the trace.
+    """Plan a motion; the joints of every tick are left in `b.trace`.
 
     Args:
-        work: arm, controller and pursuit, see `workspace`.
+        work: arm, controller and pursuit, see `arm_arrays`.
         g: the arm among obstacles, see `robot_arrays`.
-        tool: the tool among obstacles, see `edges.tool_arrays`.
-        demo: (n, 8) demonstrated segment.
-        goal: (8,) pose to end at.
-        lead: (m, 8) how to leave, from the pose at q on; at least that pose.
-        q: (dof,) joints at the start, moved to the end.
-        fraction: of the imitated path, where the guiding pose is.
-        spacing: screw length [m] between poses of the blend.
+        tool: the tool among obstacles, see `edge_certificates.tool_arrays`.
+        demo: (n, 8) demonstrated path.
+        goal: (8,) pose of the tcp at the end.
+        lead: (m, 8) path by which the start is left, from the pose at q on; at least that pose.
+        q: (dof,) joints at the start; at the end on return.
+        fraction: share of the imitated path before the guiding pose.
+        spacing: path length [m] between poses of the blend.
         dt: seconds per tick.
         b: see `Buffers`.
-        pursuit_state: (4,) of the pursuit.
+        pursuit_state: (4,) state of the pursuit.
         wish: (dof,) scratch.
         out: (dof,) scratch.
 
@@ -133,25 +153,26 @@ def plan_closed_loop(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, 
     at = _copied(lead, 0, len(lead), b.path, 0)
     at = write_edge(b.path, at, screw.load8(lead, len(lead) - 1), screw.load8(b.imitated, guide), spacing)
     full = _copied(b.imitated, guide + 1, n, b.path, at) if at > 0 else 0
-    counts[IMITATED], counts[GUIDE], counts[LAST], counts[CHANGED] = n, guide, 0, 0
+    counts[COUNT.imitated], counts[COUNT.guide], counts[COUNT.last], counts[COUNT.changed] = n, guide, 0, 0
     if full == 0:
         return -1, 0, -math.inf
     b.log[:] = 0.0
-    status, full, counts[DETOURS] = escape(
+    status, full, counts[COUNT.detours] = escape(
         tool, b.path, full, b.spare, b.slacks, b.places, b.poses, b.branch, b.tree, b.cells, b.heap, b.options,
         b.state, b.log,
     )  # fmt: skip
-    counts[FULL], counts[TREE_ROWS] = full, b.log[last_tree(status, counts[DETOURS], len(b.log)), 0]
+    failed = last_tree(status, counts[COUNT.detours], len(b.log))
+    counts[COUNT.full], counts[COUNT.tree_rows] = full, b.log[failed, DETOUR_LOG.tree_rows]
     if status == ESCAPED:
         followed = _copied(b.path, 0, full, b.followed, 0)
     else:
-        # nothing is resampled where nothing is in the way: the pull to the guiding pose is the blend
+        # without a detour nothing is resampled: the pull to the guiding pose is the blend
         followed = _copied(lead, 1, len(lead), b.followed, 0)
         followed = _copied(b.imitated, guide, n, b.followed, followed)
-    counts[FOLLOWED] = followed
-    pursuit_state[0], pursuit_state[1], pursuit_state[2], pursuit_state[3] = 0.0, 0.0, np.inf, 0.0
+    counts[COUNT.followed] = followed
+    restart_pursuit(pursuit_state)
     pursuit, last, margin, changed = guarded_roll_out(
         work, g, b.followed[:followed], q, dt, pursuit_state, wish, out, b.trace, 0
     )
-    counts[LAST], counts[CHANGED] = last, changed
+    counts[COUNT.last], counts[COUNT.changed] = last, changed
     return status, pursuit, margin

@@ -1,4 +1,4 @@
-"""A leg by a search in joint space: to a posture on the demonstrated path from which the rest can be followed."""
+"""A motion found by a search in joint space: to a posture on the imitated path from which the rest can be followed."""
 
 from __future__ import annotations
 
@@ -22,26 +22,27 @@ if TYPE_CHECKING:
 
 
 ROUND_SHRINK, MIN_ITERATIONS = 4, 100
-"""Factor by which an earlier round takes fewer samples: most ways are found soon or not at all; and the fewest."""
+"""Factor by which each earlier round takes fewer samples, since most paths are found soon or not at all; and the least
+number of samples."""
 INFEASIBLE_COST = 100.0
-"""Cost [rad] of a posture from which what must come next cannot be done."""
+"""Cost [rad] of a posture from which a required next motion is infeasible."""
 SEED_SPREAD = 0.5
-"""Spread [rad] of the starts of the inverse kinematics around the nearest posture."""
+"""Standard deviation [rad] of the starts of the inverse kinematics around the nearest posture."""
 MAX_DEVIATION, CHECK_EVERY = 0.004, 3
-"""Distance [m] from its path up to which a strict leg counts as straight; and ticks between looks at it."""
+"""Largest deviation [m] of a motion without detours from its path; and ticks between checks of it."""
 RAMP = 0.3
 """Seconds from rest to full speed."""
 
 
 class JointSpaceMotion(NamedTuple):
-    """What a search found.
+    """The result of a search.
 
     Attributes:
         joints: (t, dof) joints at every tick.
-        path: the part of the demonstrated path that is followed at the end.
+        path: the part of the imitated path that is followed at the end.
         guide: index in the imitated path at which that part begins.
         margin: smallest joint margin [rad].
-        next_feasible: what comes next can be done from its end.
+        next_feasible: the next motion is possible from its end.
     """
 
     joints: np.ndarray
@@ -52,12 +53,12 @@ class JointSpaceMotion(NamedTuple):
 
 
 class NextMotionCheck(NamedTuple):
-    """What comes after a leg.
+    """Check of the motion that follows.
 
     Attributes:
         scene: the arm among the obstacles, with the contacts that are wanted then.
         path: of the tcp.
-        required: it must be possible from the end of the leg.
+        required: the motion must be possible from the end of the plan.
     """
 
     scene: PlanningScene
@@ -65,17 +66,24 @@ class NextMotionCheck(NamedTuple):
     required: bool
 
     def is_feasible(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
-        """True if it can be followed from joints q (dof,); without detours if it is required."""
+        """Return whether the motion can be followed; a required one without leaving its path.
+
+        Args:
+            arm: the arm.
+            work: the arm, its controller and pursuit, see `arm_arrays`.
+            q: (dof,) joints at its start.
+            settings: of the planner.
+        """
         joints, _ = _followed(self.scene, work, self.path, q, settings)
         return joints is not None and (not self.required or path_deviation(arm, joints, self.path.dqs) <= MAX_DEVIATION)
 
 
 def path_deviation(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
-    """The farthest [m] that the tool is from a path.
+    """Return the largest distance [m] of the tool from a path.
 
     Args:
         arm: the arm.
-        joints: (t, dof) on the way.
+        joints: (t, dof) of the motion.
         path: (n, 8) poses of the tool.
     """
     edges = PosePath(path).positions
@@ -112,17 +120,17 @@ def plan_joint_space(
     after: NextMotionCheck | None,
     seed: int,
 ) -> JointSpaceMotion | None:
-    """Search a way from joints q (dof,) to the goal; None if none was found.
+    """Search a path in joint space to the goal, imitating the end of the demonstration; None without success.
 
     Args:
         arm: the arm.
-        scene: it among obstacles.
-        work: its controller and pursuit, see `workspace`.
-        demonstrated: the segment to imitate.
-        goal: where the tcp must end.
+        scene: the arm among obstacles.
+        work: the arm, its controller and pursuit, see `arm_arrays`.
+        demonstrated: the path to imitate.
+        goal: pose of the tcp at the end.
         q: (dof,) joints at the start.
         settings: see `PlanSettings`.
-        after: what comes next, or None.
+        after: check of the next motion; None: there is none.
         seed: of all random choices.
     """
     search = settings.search
@@ -139,7 +147,7 @@ def plan_joint_space(
         best, least = None, math.inf
         for posture in sorted(found)[: search.postures]:
             if posture.cost >= least:
-                break  # no way is shorter than the straight line
+                break  # no path is shorter than the straight line
             count = connect(scene.seen, q, posture.q, trees, parents, search.step, iterations, state, out)
             if count:
                 count = shortcut(scene.seen, out, count, search.shortcuts, state, ends)
@@ -156,12 +164,12 @@ def plan_joint_space(
 
 
 def _length(points: np.ndarray) -> float:
-    """Of a joint path (n, dof), by the joint that moves most on each line [rad]."""
+    """Length [rad] of a joint path (n, dof), by the joint that moves most on each line."""
     return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
 
 
 def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, seeds) -> list[_Posture]:
-    """Clear postures on the demonstrated path from which the rest of it can be followed, with what they cost."""
+    """Clear postures on the imitated path from which the rest of it can be followed, with their costs."""
     search, found = settings.search, []
     imitated = imitated_path(demonstrated, goal)
     first, last = guide_index(imitated, settings.motion.guide), len(imitated) - 1
@@ -201,13 +209,13 @@ def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]
 
 
 def timed_on_lines(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:
-    """Points at every tick of `dt` [s] on the straight lines between joint points (n, dof), each from rest to rest.
+    """Return joints at every tick on the straight lines between points, each line from rest to rest.
 
-    A corner that is taken at speed throws what is in the hand about.
+    A corner taken at speed would throw the held object about.
 
     Args:
-        points: (n, dof) joints.
-        speeds: (dof,) largest speeds of the joints.
+        points: (n, dof) joints [rad or m].
+        speeds: (dof,) largest joint speeds [rad/s or m/s].
         dt: seconds per tick.
     """
     rows = [points[:1]]

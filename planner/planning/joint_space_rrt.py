@@ -7,28 +7,12 @@ from __future__ import annotations
 
 import math
 
-from ..collision.clearance import SELF_MARGIN, all_beyond, bound_motion, capsule_distance, obstacle_distance, slack_at
-from ..collision.robot_arrays import (
-    AFTER,
-    B_FRAME,
-    BODY,
-    HEADER,
-    HIGH,
-    LOW,
-    MARGIN,
-    N_CAPSULES,
-    N_OBSTACLES,
-    N_PAIRS,
-    OBSTACLES,
-    PAIRS,
-    PART,
-    SETTINGS,
-    W_REACH,
-    WORLD,
-    may_touch,
-    place_capsules,
-)
+from ..collision.capsule_placement import may_touch, place_capsules
+from ..collision.clearance import all_beyond, capsule_distance, obstacle_distance, slack_at
+from ..collision.robot_arrays import CAPSULE, HEADER, MAX_JOINTS, PAIR, PLACED, ROW, SETTING
+from ..collision.step_certificates import bound_motion
 from ..escape.tangent_plane import random_number
+from ..geometry.shapes import OBSTACLE
 from ..jit import inlined, inner, kernel
 
 SMALLEST = 1e-4
@@ -37,27 +21,27 @@ SMALLEST = 1e-4
 
 @inner
 def _clear_stretch(g):
-    """Fraction of a step, up to 1, that is proven clear from WORLD on, given the ways in W_REACH; -1 if too close."""
+    """Fraction of a step, up to 1, that is proven clear from ROW.placed on; -1 if the robot is too close already."""
     stretch, longest = 1.0, 0.0
-    for c in range(int(g[HEADER, N_CAPSULES])):
-        longest = max(longest, g[WORLD + c, W_REACH])
-    for k in range(int(g[HEADER, N_OBSTACLES])):
-        margin = g[OBSTACLES + k, MARGIN]
-        if all_beyond(g, WORLD, k, 0.0, margin + stretch * longest):
+    for c in range(int(g[ROW.header, HEADER.capsules])):
+        longest = max(longest, g[ROW.placed + c, PLACED.reach])
+    for k in range(int(g[ROW.header, HEADER.obstacles])):
+        margin = g[ROW.obstacles + k, OBSTACLE.margin]
+        if all_beyond(g, ROW.placed, k, 0.0, margin + stretch * longest):
             continue
-        for c in range(int(g[HEADER, N_CAPSULES])):
-            if g[BODY + c, B_FRAME] >= 0.0 and not may_touch(g, k, c):
-                displacement = g[WORLD + c, W_REACH]
-                slack = obstacle_distance(g, WORLD, c, k, 0.0, margin + stretch * displacement) - margin
+        for c in range(int(g[ROW.header, HEADER.capsules])):
+            if g[ROW.body + c, CAPSULE.frame] >= 0.0 and not may_touch(g, k, c):
+                displacement = g[ROW.placed + c, PLACED.reach]
+                slack = obstacle_distance(g, ROW.placed, c, k, 0.0, margin + stretch * displacement) - margin
                 if slack < 0.0:
                     return -1.0
                 if slack < stretch * displacement:
                     stretch = slack / displacement
-    first = int(g[HEADER, PAIRS])
-    for p in range(first, first + int(g[HEADER, N_PAIRS])):
-        i, j = int(g[p, 0]), int(g[p, 1])
-        displacement = g[WORLD + i, W_REACH] + g[WORLD + j, W_REACH]
-        slack = capsule_distance(g, WORLD, i, j) - g[SETTINGS, SELF_MARGIN]
+    first = int(g[ROW.header, HEADER.first_pair])
+    for p in range(first, first + int(g[ROW.header, HEADER.pairs])):
+        i, j = int(g[p, PAIR.first]), int(g[p, PAIR.second])
+        displacement = g[ROW.placed + i, PLACED.reach] + g[ROW.placed + j, PLACED.reach]
+        slack = capsule_distance(g, ROW.placed, i, j) - g[ROW.settings, SETTING.self_margin]
         if slack < 0.0:
             return -1.0
         if slack < stretch * displacement:
@@ -67,8 +51,14 @@ def _clear_stretch(g):
 
 @kernel
 def joint_edge_is_clear(g, start, end):
-    """True if the robot keeps clear on the straight line in joint space from start to end, both included."""
-    n, part, at = len(start), g[PART], g[AFTER]
+    """Return whether the robot is proven clear on the straight line in joint space, both ends included.
+
+    Args:
+        g: the robot among obstacles, see `robot_arrays`; changed.
+        start: (n,) joints.
+        end: (n,) joints.
+    """
+    n, part, at = len(start), g[ROW.part], g[ROW.after]
     for s in (1.0, 0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
         for i in range(n):
             at[i] = start[i] + s * (end[i] - start[i])
@@ -79,16 +69,16 @@ def joint_edge_is_clear(g, start, end):
         for i in range(n):
             at[i] = start[i] + s * (end[i] - start[i])
             part[i] = (1.0 - s) * (end[i] - start[i])
-        place_capsules(g, at[:n], WORLD)
-        bound_motion(g, WORLD, part)
+        place_capsules(g, at[:n], ROW.placed)
+        bound_motion(g, ROW.placed, part)
         stretch = _clear_stretch(g)
         if stretch < 0.0:
             return False
         if stretch >= 1.0:
             return True
         displacement = 0.0
-        for c in range(int(g[HEADER, N_CAPSULES])):
-            displacement = max(displacement, g[WORLD + c, W_REACH])
+        for c in range(int(g[ROW.header, HEADER.capsules])):
+            displacement = max(displacement, g[ROW.placed + c, PLACED.reach])
         if stretch * displacement < SMALLEST:
             return False
         s += stretch * (1.0 - s)
@@ -174,11 +164,11 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
         trees[0, 0, i], trees[1, 0, i] = start[i], goal[i]
     parents[0, 0] = parents[1, 0] = -1
     counts = (1, 1)
-    sample = g[8, 16 : 16 + n]
+    sample = g[ROW.part, MAX_JOINTS : MAX_JOINTS + n]
     for k in range(iterations):
         a, b = (0, 1) if k % 2 == 0 else (1, 0)
         for i in range(n):
-            low, high = max(g[LOW, i], -math.pi), min(g[HIGH, i], math.pi)
+            low, high = max(g[ROW.lower, i], -math.pi), min(g[ROW.upper, i], math.pi)
             sample[i] = low + random_number(state) * (high - low)
         if k < 2:
             for i in range(n):

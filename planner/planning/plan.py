@@ -1,58 +1,56 @@
-"""What a planner is asked, how, and what it answers: settings, problems, plans.
+"""Requests and plans: what a planner is asked, and what it answers.
 
-A plan that is none has a `reason`, the kind of failure, and a `detail`, what in this case, for the reader:
+A failed plan has a `reason`, the kind of failure, and a `detail`, the facts of this case for the reader:
 
-| reason | what it says | detail |
+| reason | meaning | detail |
 |---|---|---|
-| start beyond a joint limit | the arm stands where it may not | the joint |
-| start in collision | the arm is closer to something than it must keep | part of the body, obstacle, distance |
-| goal in collision | the tool would be, at the goal | the same |
-| no room for a detour at the start | clear, but closer than detours are planned | the same |
-| no room for a detour at the goal | the same of the goal | the same |
-| no escape found | all escape trees have come to their end without seeing the path again | how many nodes |
-| node limit reached | an escape tree was stopped at `RepetSettings.nodes`: more of them may help | the limit |
+| start beyond a joint limit | a joint of the start lies outside its limits | the joint |
+| start in collision | at the start the arm is closer to something than its margin | part, obstacle, distance |
+| goal in collision | at the goal the tool is closer to something than its margin | part, obstacle, distance |
+| no room for a detour at the start | the start is clear, but too close for detours | part, obstacle, distance |
+| no room for a detour at the goal | the goal is clear, but too close for detours | part, obstacle, distance |
+| no escape found | no escape tree saw the path again | number of nodes |
+| node limit reached | an escape tree stopped at `RepetSettings.nodes`: more nodes may help | the limit |
 | the detours do not fit into the longest path allowed | see `RepetSettings.longest` | |
-| ik_or_limit | there is a way for the tool that the arm does not follow to its end | |
+| ik_or_limit | the arm does not follow any path of the tool to its end | |
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..control.arm_arrays import arm_arrays
-from ..errors import PlanFailed
+from ..errors import BadOption
 from ..escape.detour import GOAL_IN_COLLISION, START_IN_COLLISION
 from ..escape.repet import REASONS, EscapeTree
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
+from ..imitation.demonstration import Demonstration
+from ..log.motion_log import MotionLog
 from ..robot.arm import Arm
 from ..robot.body import Body
-from .planning_scene import PlanningScene
-from .refine import SMOOTH_TOLERANCE, retimed, smoothed
 from .settings import PlanSettings
-
-ACCELERATION = 5.0
-"""Limit of the joints' acceleration [rad/s^2] where none is given: about a third of what a Panda can do."""
 
 WHY = {
     **REASONS,
     START_IN_COLLISION: "no room for a detour at the start",
     GOAL_IN_COLLISION: "no room for a detour at the goal",
 }
-"""Of an escape that was not found: start and goal have been seen to be clear before."""
+"""Reason of a plan for each status of an escape that failed; start and goal were found clear before."""
 
 
 class NextMotion(NamedTuple):
-    """What comes after a leg, with the same body.
+    """The motion that follows a plan, with the same body.
 
     Attributes:
         path: of the tcp.
-        allowed: contacts that are wanted then, see `Planner.plan`.
-        required: a plan from whose end it cannot be followed is only a fallback; else such ends are preferred in
-            a search.
+        allowed: contacts that are wanted during it; see `PlanRequest.allowed`.
+        required: a plan from whose end the motion cannot be followed is only a fallback; else such ends are merely
+            less preferred by the search in joint space.
     """
 
     path: PosePath
@@ -61,55 +59,55 @@ class NextMotion(NamedTuple):
 
 
 class PlanRequest(NamedTuple):
-    """What a plan is the answer to, besides the path.
+    """A motion to plan.
 
     Attributes:
-        arm: whose joints these are.
-        body: its capsules, held object included.
-        goal: of the tcp.
-        obstacles: as they were.
-        allowed: pairs of names that may touch.
-        settings: of the planner.
-        demonstrated: the segment that was to be imitated, where it was shown.
+        demonstrated: the path of the tcp to imitate, any number of poses.
+        start: (dof,) joints now.
+        goal: pose of the tcp at the end.
+        obstacles: as they are now; they are taken to stand still.
+        allowed: pairs of names (part of the body or held object, obstacle) that may touch.
+        leaving: path of the tcp from its pose at `start` on, by which the start is left; None: blend at once.
+        next_motion: the motion that follows, if it is known.
+        seed: of all random choices; the same seed gives the same plan.
     """
 
-    arm: Arm
-    body: Body
+    demonstrated: PosePath
+    start: ArrayLike
     goal: Pose
-    obstacles: tuple[Obstacle, ...]
-    allowed: tuple[tuple[str, str], ...]
-    settings: PlanSettings
-    demonstrated: PosePath | None = None
-
-    @property
-    def scene(self) -> PlanningScene:
-        """The arm among the obstacles."""
-        return PlanningScene.of(self.arm, self.body, self.obstacles, self.settings, self.allowed)
+    obstacles: tuple[Obstacle, ...] = ()
+    allowed: tuple[tuple[str, str], ...] = ()
+    leaving: PosePath | None = None
+    next_motion: NextMotion | None = None
+    seed: int = 0
 
 
 class Plan(NamedTuple):
-    """A planned leg.
+    """A planned motion, with all that is needed to check it.
 
     Attributes:
-        joints: (t, dof) joints at every tick, from the start; only the start where nothing was found.
+        joints: (t, dof) joints at every tick, from the start; only the start if the plan failed.
         dt: seconds between them.
-        reason: "" if the plan arrives and every step of it is proven clear; else why there is none, see the module.
-        how: "direct", "escape" or "joint search"; other makers of plans have other words, see `onedemo.baselines`.
-        imitated_poses: (n, 8) of the demonstration moved to the goal.
-        path_poses: (m, 8) of what was followed: the imitated path behind the guiding pose, or a detour.
-        tree_rows: of the last escape tree; none if none was grown.
-        detours: number of them.
-        margin: smallest joint margin on the way [rad].
-        changed: ticks in which the safety layer changed the command.
-        tries: closed loops that were tried.
-        seconds: that planning took.
-        request: what it is the answer to.
-        detail: what the reason is in this case; "" if there is no more to say.
-        guide: index in the imitated path from which on it was to be followed.
+        reason: "" if the plan arrives and every step of it is proven clear; else the kind of failure, see the module.
+        how: "direct", "escape" or "joint search"; other planners have other words, see `onedemo.baselines`.
+        imitated_poses: (n, 8) of the demonstrated path moved to the goal.
+        path_poses: (m, 8) of the path that was followed: the imitated path from the guiding pose on, or a detour.
+        tree_rows: rows of the last escape tree; none if none was grown.
+        detours: number of detours.
+        margin: smallest joint margin [rad] on the motion.
+        changed: number of ticks in which the safety layer changed the command.
+        tries: number of closed loops that were tried.
+        seconds: planning time.
+        request: the request that the plan answers.
+        arm: whose joints these are.
+        body: its capsules, held object included.
+        settings: of the planner.
+        detail: the facts of the failure; "" if there is no more to say.
+        guide: index of the guiding pose in the imitated path.
         imitated_share: share of the imitated path behind the wanted guiding pose that is followed, by path length;
-            above 1 where the plan joins it earlier.
-        refined: what has been done to it since: "smooth", "timed".
-        next_feasible: what must come next can be followed from its end.
+            above 1 where the plan joins the path earlier.
+        refined: refinements made since: "smooth", "timed".
+        next_feasible: False if a required next motion cannot be followed from the end of the plan.
     """
 
     joints: np.ndarray
@@ -125,6 +123,9 @@ class Plan(NamedTuple):
     tries: int
     seconds: float
     request: PlanRequest
+    arm: Arm
+    body: Body
+    settings: PlanSettings
     detail: str = ""
     guide: int = 0
     imitated_share: float = 1.0
@@ -133,7 +134,7 @@ class Plan(NamedTuple):
 
     @property
     def success(self) -> bool:
-        """The plan arrives, and every step of it is proven clear."""
+        """True if the plan arrives and every step of it is proven clear."""
         return not self.reason
 
     @property
@@ -143,77 +144,114 @@ class Plan(NamedTuple):
 
     @property
     def end_margin(self) -> float:
-        """Distance of the last joints to a joint limit [rad]."""
-        return self.request.arm.margin(self.joints[-1])
+        """Joint margin [rad] at the end."""
+        return self.arm.margin(self.joints[-1])
 
     @property
     def imitated(self) -> PosePath:
-        """The demonstration moved to the goal."""
+        """The demonstrated path moved to the goal."""
         return PosePath(self.imitated_poses)
 
     @property
     def path(self) -> PosePath:
-        """What was followed: the imitated path behind the guiding pose, or a detour."""
+        """The path that was followed: the imitated path from the guiding pose on, or a detour."""
         return PosePath(self.path_poses)
 
     @property
     def tree(self) -> EscapeTree | None:
-        """The last escape tree, None if none was grown."""
+        """The last escape tree; None if none was grown."""
         return EscapeTree.from_rows(self.tree_rows) if len(self.tree_rows) else None
 
-    def smoothed(self, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
-        """The plan along a C1 curve of the tool that stays near its path, proven clear again.
-
-        Args:
-            tolerance: screw length [m] that poses of the path may be away from those the curve is laid through.
-
-        Raises:
-            PlanFailed: "plan_failed", there is no plan, it leads through joint space, or the curve is not clear or
-                not followed to its end.
-        """
-        self._must_be_there("make smooth")
-        if self.how == "joint search":
-            raise PlanFailed("plan_failed", "a way through joint space has no path of the tool to make smooth")
-        arm, motion = self.request.arm, self.request.settings.motion
-        here = arm.fk(self.joints[0])
-        path = PosePath(here.dq[None]).joined(self.path)
-        work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
-        curve, joints, margin, changed = smoothed(
-            path, self.joints[0], self.request.scene, work, motion.dt, self.request.settings.max_seconds, tolerance
-        )
-        return self._replace(
-            joints=joints, path_poses=curve.dqs, margin=margin, changed=changed, refined=(*self.refined, "smooth")
+    def log(self) -> MotionLog:
+        """Return the motion and its world as `certify` takes them; a failed plan claims nothing."""
+        request = self.request
+        return MotionLog(
+            arm=self.arm,
+            body=self.body,
+            obstacles=request.obstacles,
+            time=self.dt * np.arange(len(self.joints)),
+            joints=self.joints,
+            safety=self.settings.safety.distance,
+            goal=request.goal,
+            demonstrated=self.imitated if self.success else None,
+            allowed=request.allowed,
+            claims={"joint_margin": self.margin} if self.success else {},
         )
 
-    def timed(self, acceleration_limits: ArrayLike = ACCELERATION) -> Plan:
-        """The plan's joints on a C2 spline, as fast as velocity and acceleration limits allow, from rest to rest.
+
+class MotionPlanner(ABC):
+    """Plans motions of one arm; a planner implements `answer`.
+
+    Attributes:
+        arm: the arm.
+        body: its capsules, held object included.
+        settings: of the planner.
+    """
+
+    arm: Arm
+    body: Body
+    settings: PlanSettings
+
+    @abstractmethod
+    def answer(self, request: PlanRequest) -> Plan:
+        """Plan a motion; a failed plan says why."""
+
+    def plan(
+        self,
+        demonstrated: Demonstration | PosePath,
+        start: ArrayLike,
+        goal: Pose,
+        obstacles: Sequence[Obstacle] = (),
+        *,
+        segment: str | None = None,
+        allowed: Sequence[tuple[str, str]] = (),
+        leaving: PosePath | None = None,
+        next_motion: NextMotion | None = None,
+        seed: int = 0,
+    ) -> Plan:
+        """Plan a motion.
 
         Args:
-            acceleration_limits: (dof,) or one number [rad/s^2].
+            demonstrated: a demonstration, or the path of the tcp to imitate.
+            start: (dof,) joints now [rad or m].
+            goal: pose of the tcp at the end.
+            obstacles: as they are now; they are taken to stand still.
+            segment: name of the demonstration's segment to imitate; not needed if there is only one, or none.
+            allowed: pairs of names (part of the body or held object, obstacle) that may touch.
+            leaving: path of the tcp from its pose at `start` on, by which the start is left; None: blend at once.
+            next_motion: the motion that follows, if it is known.
+            seed: of all random choices; the same seed gives the same plan.
+
+        Returns:
+            The plan; if it failed, its `reason` says why.
 
         Raises:
-            PlanFailed: "plan_failed", there is no plan, or the spline between its points is not clear.
+            BadOption: the demonstration has several segments and none is named, or `segment` is given with a path.
+            UnknownName: the demonstration has no segment of that name.
+            BadShape, NotFinite: `start` is not (dof,) finite numbers.
         """
-        self._must_be_there("time")
-        joints = retimed(self.joints, self.dt, acceleration_limits, self.request.arm, self.request.scene).joints
-        margin = min(self.request.arm.margin(q) for q in joints)
-        # what is timed is no closed loop any more
-        return self._replace(joints=joints, margin=margin, changed=0, refined=(*self.refined, "timed"))
-
-    def refused(self, failure: PlanFailed) -> Plan:
-        """What is left of the plan after its refinement has failed: no plan, with the reason."""
-        return self._replace(joints=self.joints[:1], reason=failure.reason, detail=failure.detail)
-
-    def _must_be_there(self, what: str) -> None:
-        if not self.success:
-            raise PlanFailed("plan_failed", f"there is no plan to {what}: {self.why}")
+        path = segment_of(demonstrated, segment)
+        return self.answer(PlanRequest(path, start, goal, tuple(obstacles), tuple(allowed), leaving, next_motion, seed))
 
 
-class Problem(NamedTuple):
-    """A leg to plan; see `Planner.plan`."""
+def segment_of(demonstrated: Demonstration | PosePath, segment: str | None = None) -> PosePath:
+    """Return the path of the tcp to imitate.
 
-    demonstrated: PosePath
-    start: np.ndarray
-    goal: Pose
-    obstacles: tuple[Obstacle, ...] = ()
-    seed: int = 0
+    Args:
+        demonstrated: a demonstration, or a path, which is returned as it is.
+        segment: name of the demonstration's segment; None: its only one, or the whole path if it has none.
+
+    Raises:
+        BadOption: the demonstration has several segments and none is named, or `segment` is given with a path.
+        UnknownName: the demonstration has no segment of that name.
+    """
+    if isinstance(demonstrated, PosePath):
+        if segment is not None:
+            raise BadOption("segment", f"{segment!r} is given, but a path has no segments")
+        return demonstrated
+    if segment is not None:
+        return demonstrated.segment_path(segment)
+    names = [each.name for each in demonstrated.segments]
+    if len(names) > 1:
+        raise BadOption("segment", f"{demonstrated.name!r} has several: name one of {', '.join(names)}")
+    return demonstrated.segment_path(names[0]) if names else demonstrated.path

@@ -7,33 +7,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..collision.clearance import FIRST, GAP, KEEP, KIND, OTHER, SELF_MARGIN, find_near, slack_at
-from ..collision.edge_certificates import tool_arrays, tool_slack
-from ..collision.robot_arrays import (
-    FRAMES,
-    HEADER,
-    MARGIN,
-    N_NEAR,
-    N_OBSTACLES,
-    NEAR,
-    OBSTACLES,
-    SEEN,
-    SEEN_COUNTS,
-    SEEN_MOVING,
-    SETTINGS,
-    WORLD,
-    place_capsules,
-    place_frames,
-    robot_arrays,
-    with_obstacles,
-)
+from ..collision.capsule_placement import place_capsules, place_frames
+from ..collision.clearance import find_near, slack_at
+from ..collision.edge_certificates import pose_tool, tool_arrays, tool_slack
+from ..collision.robot_arrays import HEADER, LAST_LOOK, NEAR_PAIR, ROW, SETTING, robot_arrays, with_obstacles
 from ..collision.self_collision import body_pairs
 from ..errors import BadOption
 from ..escape.repet import MAX_OBSTACLES
 from ..geometry.pose import Pose
-from ..geometry.shapes import Obstacle, pack
+from ..geometry.shapes import OBSTACLE, Obstacle, pack
 from ..robot.arm import Arm
-from ..robot.body import FRAME, Body
+from ..robot.body import BODY, Body
 from ..safety.safety_layer import SafetySettings, contact_masks
 
 if TYPE_CHECKING:
@@ -41,24 +25,30 @@ if TYPE_CHECKING:
 
 
 def checked_obstacles(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
-    """The obstacles, if they are not too many for queries that look at all of them."""
+    """Return the obstacles as a tuple.
+
+    Raises:
+        BadOption: there are more than `MAX_OBSTACLES`: every query visits all of them.
+    """
     if len(obstacles) > MAX_OBSTACLES:
         raise BadOption("obstacles", f"there are {len(obstacles)}; allowed are {MAX_OBSTACLES}")
     return tuple(obstacles)
 
 
-PLACE = slice(2, 20)
+PLACE = slice(OBSTACLE.center, OBSTACLE.ball)
 """Columns of an obstacle that change when it moves."""
+VELOCITY = slice(OBSTACLE.velocity, OBSTACLE.ball)
+"""Columns of the velocity of an obstacle."""
 
 
 class Tightest(NamedTuple):
-    """The pair that has least room.
+    """The pair with the least slack.
 
     Attributes:
         part: name of the part of the body, or of what it holds.
         other: name of the obstacle, or of another part; "obstacle 3", counted from 0, if it has none.
-        distance: distance between them [m], negative inside.
-        margin: distance that they must keep [m].
+        distance: between them [m], negative inside.
+        margin: required distance [m].
     """
 
     part: str
@@ -67,22 +57,27 @@ class Tightest(NamedTuple):
     margin: float
 
     def __str__(self) -> str:
-        """For messages."""
+        """The pair in words, for messages."""
         if self.distance <= 0.0:
             return f"{self.part} touches {self.other}"
         return f"{self.part} is {1e3 * self.distance:.1f} mm from {self.other}, which must be {1e3 * self.margin:.1f}"
 
 
 class SceneTemplate:
-    """What of the work arrays belongs to the arm and its body: made once, copied for every scene.
+    """The arrays of an arm and its body without obstacles: made once, copied for every scene.
 
-    Without a guard the arm that follows a path is among nothing: it is not held back by what is there.
+    Args:
+        arm: the arm.
+        body: its capsules, held object included.
+        safety: settings of the safety layer.
+        dt: seconds per tick.
+        guard: False: the arm follows paths as if there were no obstacles.
     """
 
     def __init__(self, arm: Arm, body: Body, safety: SafetySettings, dt: float, *, guard: bool = True):
         nothing = pack(())
         self.names, self.safety = body.names, safety
-        self.at_tool = np.flatnonzero(body.rows[:, FRAME] == arm.dof - 1)
+        self.at_tool = np.flatnonzero(body.rows[:, BODY.frame] == arm.dof - 1)
         self.tool_names = tuple(body.names[row] for row in self.at_tool)
         pairs = body_pairs(arm, body, safety.self_distance)
         self.robot = robot_arrays((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
@@ -91,14 +86,14 @@ class SceneTemplate:
 
 
 class PlanningScene:
-    """The work arrays of an arm among obstacles: `robot` for the whole arm, `tool(factor)` for the tool.
+    """The arrays of an arm among obstacles: `robot` to follow paths, `seen` for queries, `tool(factor)` for the tool.
 
-    `seen` is the whole arm among them for queries, also where the layout has no guard and `robot` is among nothing.
+    Without a guard `robot` is among no obstacles; `seen` always is among all of them.
 
     Args:
-        layout: of the arm and its body.
+        layout: the arrays of the arm and its body.
         obstacles: as they are now.
-        distance: for planning, to keep between tool and obstacles without a margin of their own [m].
+        distance: planning margin [m] of the tool from obstacles without a margin of their own.
         allowed: pairs of names (part of the body or held object, obstacle) that may touch.
     """
 
@@ -119,8 +114,8 @@ class PlanningScene:
         )
         tool_masks = [sum(1 << k for k, row in enumerate(layout.at_tool) if mask >> int(row) & 1) for mask in masks]
         self._tool = with_obstacles(layout.tool, packed, tool_masks, distance)
-        self._margins = self._tool[OBSTACLES : OBSTACLES + len(obstacles), MARGIN]
-        self._own = packed.rows[:, 23] >= 0.0
+        self._margins = self._tool[ROW.obstacles : ROW.obstacles + len(obstacles), OBSTACLE.margin]
+        self._own = packed.rows[:, OBSTACLE.own_margin] >= 0.0
         self.robot_distance = layout.safety.distance
 
     @staticmethod
@@ -131,41 +126,53 @@ class PlanningScene:
         settings: PlanSettings,
         allowed: Sequence[tuple[str, str]] = (),
     ) -> PlanningScene:
-        """The arrays for the distances of these settings, laid out anew."""
+        """Lay out a scene anew.
+
+        Args:
+            arm: the arm.
+            body: its capsules, held object included.
+            obstacles: as they are now.
+            settings: of the planner: margins, time step, guard.
+            allowed: pairs of names (part of the body or held object, obstacle) that may touch.
+
+        Raises:
+            BadOption: there are too many obstacles.
+        """
         layout = SceneTemplate(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
         return PlanningScene(layout, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
     def move(self, obstacles: Sequence[Obstacle]) -> None:
-        """The same obstacles at other places, with other velocities."""
+        """Move the same obstacles to other places, with other velocities."""
         rows = pack(obstacles).rows
         for work in (self.seen, self._tool):
-            work[OBSTACLES : OBSTACLES + len(rows), PLACE] = rows[:, PLACE]
-            work[SEEN, SEEN_COUNTS], work[SEEN, SEEN_MOVING] = 0.0, np.any(rows[:, 17:20])
+            work[ROW.obstacles : ROW.obstacles + len(rows), PLACE] = rows[:, PLACE]
+            work[ROW.last_look, LAST_LOOK.valid] = 0.0
+            work[ROW.last_look, LAST_LOOK.moving] = np.any(rows[:, VELOCITY])
 
     def tool(self, factor: float = 1.0) -> np.ndarray:
-        """The tool's array, planning distances scaled where an obstacle has none of its own."""
+        """Return the tool's array, with the planning margin scaled for obstacles without a margin of their own."""
         self._margins[~self._own] = factor * self._distance
         return self._tool
 
     def widest(self, factor: float = 1.0) -> float:
-        """Largest distance to keep [m] in the tool's array."""
+        """Return the largest margin [m] in the tool's array."""
         return max([factor * self._distance, *self._margins[self._own]])
 
     def slack(self, q: np.ndarray) -> float:
-        """Room [m] of the whole arm at joints q (dof,), up to 1 m."""
+        """Return the slack [m] of the whole arm at joints q (dof,), up to 1 m."""
         return float(slack_at(self.seen, q, 0.0, 1.0))
 
     def tool_slack(self, pose: Pose) -> float:
-        """Room [m] of the tool at a pose of the tcp, with the safety distance, up to 1 m."""
+        """Return the slack [m] of the tool at a pose of the tcp beyond the safety margin, up to 1 m."""
         return float(tool_slack(self.safe_tool(), tuple(float(value) for value in pose.dq), 1.0))
 
     def safe_tool(self) -> np.ndarray:
-        """The tool's array with the safety distance in place of the planning distance."""
+        """Return the tool's array with the safety margin in place of the planning margin."""
         return self.tool(self._safe_factor)
 
     @property
     def widest_safe(self) -> float:
-        """Largest distance to keep [m] in `safe_tool`."""
+        """Largest margin [m] in `safe_tool`."""
         return self.widest(self._safe_factor)
 
     @property
@@ -173,39 +180,50 @@ class PlanningScene:
         return self.robot_distance / self._distance if self._distance > 0 else 1.0
 
     def tightest(self, q: np.ndarray) -> Tightest | None:
-        """The pair of the whole arm with least room at joints q (dof,); None if nothing is within its distance."""
-        place_capsules(self.seen, q, WORLD)
+        """Return the whole arm's pair with the least slack at joints q (dof,); None if no pair is within its margin."""
+        place_capsules(self.seen, q, ROW.placed)
         return self._tightest(self.seen, self._template.names)
 
     def tightest_of_tool(self, pose: Pose, factor: float | None = None) -> Tightest | None:
-        """The pair of the tool with least room at a pose; with the safety distance, or a factor of the planning one."""
+        """Return the tool's pair with the least slack at a pose.
+
+        Args:
+            pose: of the tcp.
+            factor: of the planning margin; None: the safety margin.
+        """
         work = self.safe_tool() if factor is None else self.tool(factor)
-        work[FRAMES, 3:6], work[FRAMES, 6:10] = pose.position, pose.dq[:4]
-        place_frames(work, WORLD)
+        pose_tool(work, pose.position, pose.dq[:4])
+        place_frames(work, ROW.placed)
         return self._tightest(work, self._template.tool_names)
 
     def meets_mover(self) -> bool:
-        """True if an obstacle that moves is among the near pairs of the whole arm that were found last."""
+        """Return whether a moving obstacle is among the most recent near pairs of the whole arm."""
         near = self._near(self.robot)
-        others = near[near[:, KIND] == 0.0, OTHER].astype(int)
-        return bool(self.robot[OBSTACLES + others, 17:20].any())
+        others = near[near[:, NEAR_PAIR.self_pair] == 0.0, NEAR_PAIR.other].astype(int)
+        return bool(self.robot[ROW.obstacles + others, VELOCITY].any())
 
     @staticmethod
     def _near(work: np.ndarray) -> np.ndarray:
-        first = int(work[HEADER, NEAR])
-        return work[first : first + int(work[HEADER, N_NEAR])]
+        first = int(work[ROW.header, HEADER.first_near])
+        return work[first : first + int(work[ROW.header, HEADER.near])]
 
     def _tightest(self, work: np.ndarray, names: Sequence[str]) -> Tightest | None:
-        margins = work[OBSTACLES : OBSTACLES + int(work[HEADER, N_OBSTACLES]), MARGIN]
-        find_near(work, max([work[SETTINGS, SELF_MARGIN], *margins]))
+        margins = work[ROW.obstacles : ROW.obstacles + int(work[ROW.header, HEADER.obstacles]), OBSTACLE.margin]
+        find_near(work, max([work[ROW.settings, SETTING.self_margin], *margins]))
         return self.tightest_seen(work, names)
 
     def tightest_seen(self, work: np.ndarray | None = None, names: Sequence[str] = ()) -> Tightest | None:
-        """The same of the near pairs that were found last; None if there were none."""
+        """Return the tightest of the most recent near pairs; None without any.
+
+        Args:
+            work: the array whose near pairs count; None: that of the whole arm.
+            names: of its capsules.
+        """
         work, names = (self.robot, self._template.names) if work is None else (work, names)
         near = self._near(work)
         if not len(near):
             return None
-        row = near[np.argmin(near[:, GAP] - near[:, KEEP])]
-        others = self._names if row[KIND] == 0.0 else names
-        return Tightest(names[int(row[FIRST])], others[int(row[OTHER])], float(row[GAP]), float(row[KEEP]))
+        row = near[np.argmin(near[:, NEAR_PAIR.distance] - near[:, NEAR_PAIR.margin])]
+        others = self._names if row[NEAR_PAIR.self_pair] == 0.0 else names
+        part, other = names[int(row[NEAR_PAIR.capsule])], others[int(row[NEAR_PAIR.other])]
+        return Tightest(part, other, float(row[NEAR_PAIR.distance]), float(row[NEAR_PAIR.margin]))

@@ -1,4 +1,4 @@
-"""Motions made smooth: what a curve or a time law changes is proven clear again, or refused.
+"""Refinement of plans: a curve or a time law is proven clear again, or refused.
 
 Not in the paper, which names smooth curves as future work.
 """
@@ -12,55 +12,126 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..collision.edge_certificates import is_clear
-from ..control.pursuit import ARRIVED
+from ..control.arm_arrays import arm_arrays
+from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..errors import PlanFailed
 from ..geometry.pose import PosePath
 from ..geometry.smooth_path import smooth, thinned
-from ..robot.arm import Arm
 from ..safety.guarded_pursuit import guarded_roll_out
 from .joint_space_rrt import joint_edge_is_clear
+from .plan import Plan
 from .planning_scene import PlanningScene
-from .time_optimal import TimedPath, timed
+from .time_optimal import time_optimal
 
+ACCELERATION = 5.0
+"""Default limit of the joints' acceleration [rad/s^2]: about a third of what a Panda can do."""
 SMOOTH_TOLERANCE = 0.002
-"""Screw length [m] by which a path may be thinned before a curve is laid through it: the trembling of a hand."""
+"""Path length [m] by which a path may be thinned before a curve is laid through it: the tremor of a hand."""
 CURVE_SPACING = 0.005
-"""Screw length [m] between poses of a curve."""
+"""Path length [m] between poses of a curve."""
 
 
-def retimed(joints: np.ndarray, dt: float, acceleration_limits: ArrayLike, arm: Arm, scene: PlanningScene) -> TimedPath:
-    """Joints (t, dof) on a C2 spline, as fast as velocity and acceleration limits allow, from rest to rest.
+def smoothed(plan: Plan, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
+    """Return the plan along a C1 curve of the tool near its path, proven clear again.
 
     Args:
-        joints: proven clear as they are.
-        dt: seconds between samples of the result.
-        acceleration_limits: (dof,) or one number [rad/s^2].
-        arm: whose joints these are.
-        scene: it among the obstacles.
+        plan: a plan along a path of the tool.
+        tolerance: path length [m] by which poses may be off those the curve is laid through.
 
     Raises:
-        PlanFailed: "plan_failed", the spline between the joints is not clear.
+        PlanFailed: "plan_failed": the plan failed, it leads through joint space, or the curve is not clear or not
+            followed to its end.
     """
-    limits = np.broadcast_to(np.asarray(acceleration_limits, dtype=np.float64), (arm.dof,))
-    result = timed(joints, arm.velocity_limits, limits, dt)
-    for k, (a, b) in enumerate(pairwise(result.joints)):
+    _require_success(plan, "make smooth")
+    if plan.how == "joint search":
+        raise PlanFailed("plan_failed", "a way through joint space has no path of the tool to make smooth")
+    arm, motion, scene = plan.arm, plan.settings.motion, scene_of(plan)
+    path = PosePath(arm.fk(plan.joints[0]).dq[None]).joined(plan.path)
+    curve = smooth_clear_path(path, scene.safe_tool(), scene.widest_safe, tolerance=tolerance)
+    work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
+    wish, out = np.empty((2, arm.dof))
+    trace = np.empty((round(plan.settings.max_seconds / motion.dt) + 1, arm.dof))
+    status, last, margin, changed = guarded_roll_out(
+        work, scene.robot, curve.dqs, plan.joints[0].copy(), motion.dt, fresh_pursuit_state(), wish, out, trace, 0
+    )
+    if status != ARRIVED:
+        raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * motion.dt:.2f} s")
+    return plan._replace(
+        joints=trace[: last + 1].copy(),
+        path_poses=curve.dqs,
+        margin=float(margin),
+        changed=int(changed),
+        refined=(*plan.refined, "smooth"),
+    )
+
+
+def timed(plan: Plan, acceleration_limits: ArrayLike = ACCELERATION) -> Plan:
+    """Return the plan's joints on a C2 spline, from rest to rest, as fast as velocity and acceleration limits allow.
+
+    Args:
+        plan: a plan.
+        acceleration_limits: (dof,) or one number [rad/s^2].
+
+    Raises:
+        PlanFailed: "plan_failed": the plan failed, or the spline between its points is not clear.
+    """
+    _require_success(plan, "time")
+    limits = np.broadcast_to(np.asarray(acceleration_limits, dtype=np.float64), (plan.arm.dof,))
+    result = time_optimal(plan.joints, plan.arm.velocity_limits, limits, plan.dt)
+    check_joints_are_clear(result.joints, result.time, scene_of(plan))
+    margin = min(plan.arm.margin(q) for q in result.joints)
+    # a timed motion is no closed loop any more
+    return plan._replace(joints=result.joints, margin=margin, changed=0, refined=(*plan.refined, "timed"))
+
+
+def refused(plan: Plan, failure: PlanFailed) -> Plan:
+    """Return the plan as a failed one, after its refinement failed.
+
+    Args:
+        plan: the plan.
+        failure: of its refinement.
+    """
+    return plan._replace(joints=plan.joints[:1], reason=failure.reason, detail=failure.detail)
+
+
+def scene_of(plan: Plan) -> PlanningScene:
+    """Return the plan's arm among its obstacles."""
+    return PlanningScene.of(plan.arm, plan.body, plan.request.obstacles, plan.settings, plan.request.allowed)
+
+
+def check_joints_are_clear(joints: np.ndarray, time: np.ndarray, scene: PlanningScene) -> None:
+    """Refuse joints between which the motion is not proven clear.
+
+    Args:
+        joints: (t, dof) at every tick.
+        time: (t,) [s], for the message.
+        scene: the arm among the obstacles.
+
+    Raises:
+        PlanFailed: "plan_failed", with the time.
+    """
+    for k, (a, b) in enumerate(pairwise(joints)):
         if not joint_edge_is_clear(scene.seen, np.ascontiguousarray(a), np.ascontiguousarray(b)):
-            detail = f"the timed motion is not clear at {result.time[k]:.2f} s: the spline leaves the plan there"
+            detail = f"the timed motion is not clear at {time[k]:.2f} s: the spline leaves the plan there"
             raise PlanFailed("plan_failed", detail)
-    return result
+
+
+def _require_success(plan: Plan, what: str) -> None:
+    if not plan.success:
+        raise PlanFailed("plan_failed", f"there is no plan to {what}: {plan.why}")
 
 
 def smooth_clear_path(
     path: PosePath, tool: np.ndarray, widest: float, *, tolerance: float = 0.0, spacing: float = CURVE_SPACING
 ) -> PosePath:
-    """A C1 dual-quaternion curve along a tool path, every edge of it proven clear.
+    """Return a C1 dual-quaternion curve along a tool path, with every edge proven clear.
 
     Args:
         path: proven clear as it is, like `Escape.path`.
-        tool: the tool among obstacles, see `edges.tool_arrays`.
-        widest: largest distance to keep [m] in it.
-        tolerance: screw length [m] that poses of the path may be away from those the curve is laid through.
-        spacing: screw length [m] between poses of the curve.
+        tool: the tool among obstacles, see `edge_certificates.tool_arrays`.
+        widest: largest margin [m] in it.
+        tolerance: path length [m] that poses of the path may be away from those the curve is laid through.
+        spacing: path length [m] between poses of the curve.
 
     Raises:
         PlanFailed: "plan_failed", the curve is not clear somewhere.
@@ -73,37 +144,3 @@ def smooth_clear_path(
         if not is_clear(tool, a, b, widest):
             raise PlanFailed("plan_failed", f"the smooth path is not clear behind pose {k} of {len(poses)}")
     return result
-
-
-def smoothed(
-    path: PosePath,
-    start: np.ndarray,
-    scene: PlanningScene,
-    work: np.ndarray,
-    dt: float,
-    seconds: float,
-    tolerance: float,
-) -> tuple[PosePath, np.ndarray, float, int]:
-    """A motion along a smooth path: the curve, the joints of every tick, smallest joint margin, ticks changed.
-
-    Args:
-        path: of the tcp, from where it is.
-        start: (dof,) joints.
-        scene: the arm among the obstacles.
-        work: the arm, controller and pursuit, see `workspace`.
-        dt: seconds per tick.
-        seconds: longest motion.
-        tolerance: see `smooth_clear_path`.
-
-    Raises:
-        PlanFailed: "plan_failed", the curve is not clear, or the arm does not follow it to its end.
-    """
-    curve = smooth_clear_path(path, scene.safe_tool(), scene.widest_safe, tolerance=tolerance)
-    dof, pursuit_state = len(start), np.array([0.0, 0.0, np.inf, 0.0])
-    trace = np.empty((round(seconds / dt) + 1, dof))
-    status, last, margin, changed = guarded_roll_out(
-        work, scene.robot, curve.dqs, start.copy(), dt, pursuit_state, np.empty(dof), np.empty(dof), trace, 0
-    )
-    if status != ARRIVED:
-        raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * dt:.2f} s")
-    return curve, trace[: last + 1].copy(), float(margin), int(changed)

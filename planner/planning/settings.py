@@ -1,4 +1,4 @@
-"""How one motion of a task is made from a demonstrated segment: what is shared by all that plan and follow it."""
+"""Settings of plans: imitation, the search in joint space, and the planner as a whole."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from ..control.controller import ControllerSettings
 from ..control.pursuit import PursuitSettings
 from ..errors import BadOption
 from ..escape.repet import Corner, RepetSettings
+from ..ranges import check_ranges
 from ..safety.safety_layer import SafetySettings
 
 
 @dataclass(frozen=True, slots=True)
 class MotionSettings:
-    """How a demonstrated segment becomes a motion.
+    """Settings by which a demonstrated segment becomes a motion.
 
     Attributes:
         guide: fraction of the imitated path at which the blend ends (paper: 0.2).
-        max_guide: fraction behind which too little of the path would be left.
-        departure: screw length [m] of the start-anchored departure; 0 for the paper's plain form.
-        controller: the control law.
-        pursuit: how a path is followed.
+        max_guide: largest such fraction, beyond which too little of the path would be left.
+        departure: path length [m] of the start-anchored departure; 0 for the paper's plain form.
+        controller: settings of the control law.
+        pursuit: settings of path following.
         dt: seconds per tick.
     """
 
@@ -35,26 +36,25 @@ class MotionSettings:
     def __post_init__(self):
         if not 0.0 <= self.guide <= self.max_guide <= 1.0:
             raise BadOption("guide", f"need 0 <= guide <= max_guide <= 1, got {self.guide} and {self.max_guide}")
-        if self.departure < 0.0:
-            raise BadOption("departure", f"{self.departure} is negative")
+        check_ranges(self, "[0, inf]", "departure")
 
 
 @dataclass(frozen=True, slots=True)
 class JointSearchSettings:
-    """The search in joint space.
+    """Settings of the search in joint space.
 
     Attributes:
         step: longest edge [rad].
-        iterations: most samples of one search in the last round.
-        nodes: most nodes of one of its two trees.
+        iterations: maximum number of samples of one search in the last round.
+        nodes: maximum number of nodes of each of its two trees.
         seeds: starts of the inverse kinematics per pose.
-        targets: poses of the demonstrated path's tail that are aimed at, from the guiding pose to the goal.
-        postures: most postures that are searched for, the most promising first; the shortest way is taken.
-        rounds: how often, each time with twice as many seeds.
-        margin: smallest joint margin [rad] that a posture should have, so that the next leg has somewhere to go.
-        late: what coming back to the demonstrated path only at its end costs, in radians of way.
-        shortcuts: straight lines that are tried in place of stretches of what was found.
-        speed: of the largest joint speed, on the way found.
+        targets: number of poses between the guiding pose and the goal at which the imitated path may be joined.
+        postures: maximum number of postures that are searched for, the most promising first; the shortest path wins.
+        rounds: number of rounds, each with twice as many seeds.
+        margin: joint margin [rad] that a posture should have, so that the next motion is possible.
+        late: cost [rad] of joining the imitated path only at its end.
+        shortcuts: number of straight lines tried in place of stretches of the path.
+        speed: share of the largest joint speed at which the path is followed.
     """
 
     step: float = 0.3
@@ -70,14 +70,9 @@ class JointSearchSettings:
     speed: float = 0.4
 
     def __post_init__(self):
-        for name in ("step", "speed"):
-            if not 0 < getattr(self, name) <= 10:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number up to 10")
-        if not 0.0 <= self.late <= 1000.0:
-            raise BadOption("late", f"{self.late} is not from 0 to 1000")
-        for name in ("iterations", "nodes", "seeds", "targets", "postures", "rounds"):
-            if not 1 <= getattr(self, name) <= 10**6:
-                raise BadOption(name, f"{getattr(self, name)} is not from 1 to a million")
+        check_ranges(self, "(0, 10]", "step", "speed")
+        check_ranges(self, "[0, 1000]", "late")
+        check_ranges(self, "[1, 1000000]", "iterations", "nodes", "seeds", "targets", "postures", "rounds")
 
 
 BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0))
@@ -85,26 +80,26 @@ BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.5, 0.0),
 
 @dataclass(frozen=True, slots=True)
 class PlanSettings:
-    """How a leg is planned.
+    """Settings of the planner.
 
     Attributes:
         motion: imitation, controller and pursuit.
-        repet: escape trees.
-        safety: the layer that keeps the whole arm clear.
-        search: the search in joint space; None for none.
-        biases: what detours are tried for, one after the other; see `RepetSettings.bias`.
+        repet: settings of the escape trees.
+        safety: settings of the layer that keeps the whole arm clear.
+        search: settings of the search in joint space; None: no search.
+        biases: biases of the detours, tried one after the other; see `RepetSettings.bias`.
         tight: factor of the planning margin in the second half of the tries.
-        min_imitated_share: share of the demonstrated path behind the wanted guiding pose that a plan must
-            follow to be taken at once; one that comes back to it later, is a fallback.
-        end_margin: distance to a joint limit [rad] that the last joints must have for the same, so that the next
-            leg has somewhere to go.
-        effort: most closed loops that are tried in search of something better than a fallback, and rounds of the
-            search in joint space if the fallback ends at a joint limit; 0: the first plan is taken as it is.
-        spacing: screw length [m] between poses of a blend.
-        max_seconds: longest motion.
+        min_imitated_share: share of the imitated path behind the wanted guiding pose that a plan must follow to be
+            taken at once; a plan that joins the path later is a fallback.
+        end_margin: joint margin [rad] at the end that a plan must have to be taken at once, so that the next motion is
+            possible.
+        effort: maximum number of closed loops tried for something better than a fallback, and of rounds of the search
+            in joint space if the fallback ends near a joint limit; 0: the first plan is taken.
+        spacing: path length [m] between poses of a blend.
+        max_seconds: longest motion [s].
         avoid: False: no detours and no search, the safety layer alone.
-        max_deviation: distance [m] from what it follows that the tool may be led away by the safety layer.
-        guard: False: no safety layer; what is returned with success is then proven clear for the tool at most.
+        max_deviation: distance [m] by which the safety layer may lead the tool off its path.
+        guard: False: no safety layer; a successful plan is then proven clear for the tool at most.
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -123,21 +118,14 @@ class PlanSettings:
     guard: bool = True
 
     def __post_init__(self):
-        if not 0.0 < self.tight <= 1.0:
-            raise BadOption("tight", f"{self.tight} is not in (0, 1]")
-        if not 0.0 <= self.min_imitated_share <= 1.0:
-            raise BadOption("min_imitated_share", f"{self.min_imitated_share} is not from 0 to 1")
-        if not self.end_margin >= 0.0:
-            raise BadOption("end_margin", f"{self.end_margin} is not a number >= 0")
-        if not 0 <= self.effort <= 100:
-            raise BadOption("effort", f"{self.effort} is not from 0 to 100")
-        if not self.max_deviation > 0.0:
-            raise BadOption("max_deviation", f"{self.max_deviation} is not a positive number")
+        check_ranges(self, "(0, 1]", "tight")
+        check_ranges(self, "[0, 1]", "min_imitated_share")
+        check_ranges(self, "[0, inf]", "end_margin")
+        check_ranges(self, "[0, 100]", "effort")
+        check_ranges(self, "(0, inf]", "max_deviation")
         if not self.biases:
             raise BadOption("biases", "there must be at least one")
-        for name in ("spacing", "max_seconds"):
-            if not 0 < getattr(self, name) < 3600:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number below 3600")
+        check_ranges(self, "(0, 3600)", "spacing", "max_seconds")
         if self.repet.distance * self.tight < self.safety.distance:
             reason = f"{self.repet.distance} times {self.tight} is below the safety distance {self.safety.distance}"
             raise BadOption("repet.distance", reason)

@@ -18,6 +18,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
 from ..errors import BadOption, BadShape, NotFinite, PlanFailed
+from ..ranges import check_range
 
 REPEAT = 1e-8
 """Part of the path below which a step is none: neighbors are the same waypoint."""
@@ -69,7 +70,7 @@ class _Profile(NamedTuple):
     push: np.ndarray
 
 
-def timed(joints: ArrayLike, velocity_limits: ArrayLike, acceleration_limits: ArrayLike, dt: float) -> TimedPath:
+def time_optimal(joints: ArrayLike, velocity_limits: ArrayLike, acceleration_limits: ArrayLike, dt: float) -> TimedPath:
     """The fastest way along a joint path, from rest to rest, sampled every dt.
 
     A path of straight lines would have to stop at each corner, so a natural cubic spline is put through the
@@ -89,8 +90,7 @@ def timed(joints: ArrayLike, velocity_limits: ArrayLike, acceleration_limits: Ar
     waypoints = _checked(joints)
     speeds = _limits("velocity_limits", velocity_limits, waypoints.shape[1])
     accelerations = _limits("acceleration_limits", acceleration_limits, waypoints.shape[1])
-    if not 0.0 < dt < math.inf:
-        raise BadOption("dt", f"{dt} is not a positive number of seconds")
+    check_range("dt", dt, "(0, inf)")
     steps = np.linalg.norm(np.diff(waypoints, axis=0) / speeds, axis=1)
     waypoints = _without_repeats(waypoints, steps)
     if len(waypoints) == 1:

@@ -1,13 +1,13 @@
-"""What a reactive planner is told and what it says: settings, states, commands.
+"""Settings, states and commands of a reactive planner.
 
-| state | what it says of the tick |
+| state | meaning for the tick |
 |---|---|
-| following | on the leg's path |
-| escaping | on a detour of it, or on joints that a search has found |
-| waiting | it stands, or as good as, because something that moves is in the way |
-| blocked | something comes closer than the arm can keep away: this is the best there is |
+| following | the arm follows its path |
+| escaping | the arm follows a detour, or joints found by a search |
+| waiting | the arm stands, or nearly so, because a moving obstacle is in the way |
+| blocked | an obstacle comes closer than the arm can retreat; the command is the best possible |
 | done | the end is reached |
-| failed | it has given up; `reason` is "blocked" (`detail` names what is in the way of what) or "ik_or_limit" |
+| failed | the motion failed; `reason` is "blocked" (`detail` names part and obstacle) or "ik_or_limit" |
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 
 from ..errors import BadOption
 from ..planning.settings import PlanSettings
+from ..ranges import check_ranges
 
 FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
     "following", "escaping", "waiting", "blocked", "done", "failed",
@@ -29,15 +30,14 @@ STATES = (FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED)
 
 @dataclass(frozen=True, slots=True)
 class ReactiveSettings:
-    """How a leg is followed among obstacles that come and go.
+    """Settings by which a motion is followed among obstacles that come and go.
 
     Attributes:
-        plan: how it is planned; `plan.motion.dt` is the time step.
-        horizon: seconds for which obstacles are foreseen with their velocity; 0: not at all, what moves is left to
-            the safety layer.
-        patience: seconds without progress after which it is planned anew, with what moves as if it stood still.
-        give_up: seconds without progress in all after which the leg has failed.
-        lead: seconds that the safety layer looks at moving obstacles ahead of time, for an arm that lags.
+        plan: settings of its plans; `plan.motion.dt` is the time step.
+        horizon: seconds for which moving obstacles are predicted; 0: no prediction, the safety layer alone.
+        patience: seconds without progress after which the motion is planned anew, moving obstacles taken as static.
+        give_up: seconds without progress in total after which the motion has failed.
+        lead: seconds by which the safety layer sees moving obstacles ahead of time, for an arm that lags.
     """
 
     plan: PlanSettings = field(default_factory=PlanSettings)
@@ -47,22 +47,20 @@ class ReactiveSettings:
     lead: float = 0.05
 
     def __post_init__(self):
-        for name in ("horizon", "lead"):
-            if not 0 <= getattr(self, name) < 60:
-                raise BadOption(name, f"{getattr(self, name)} is not from 0 to 60 s")
+        check_ranges(self, "[0, 60)", "horizon", "lead")
         if not 0 < self.patience <= self.give_up < math.inf:
             raise BadOption("patience", f"need 0 < patience <= give_up, got {self.patience} and {self.give_up}")
 
 
 class Command(NamedTuple):
-    """What to do now.
+    """The command of one tick.
 
     Attributes:
         velocity: (dof,) joint speeds [rad/s or m/s].
         state: one of `STATES`.
-        reason: why, where the state is "blocked" or "failed".
-        slack: smallest distance of a close pair less what it must keep [m]; inf if nothing is close.
-        detail: what is in the way of what, where the state is "blocked" or "failed" and something is.
+        reason: the cause of the state "blocked" or "failed"; else "".
+        slack: smallest slack [m] of the near pairs; inf if no pair is near.
+        detail: the part and the obstacle in its way, for the states "blocked" and "failed"; else "".
     """
 
     velocity: np.ndarray

@@ -1,8 +1,8 @@
-"""What comes of it if the arm goes on, waits or goes round, while obstacles go on as they do now.
+"""Prediction: the outcome of going on, waiting or going round, if obstacles keep their velocities.
 
-Each is rolled out in the kinematic closed loop with the safety layer, obstacles moving with their velocities, for a
-short time; what is left of the path then counts with the pace of the pursuit. Detours are planned round places where
-an obstacle will be about when the arm meets it. Not in the paper, which plans at the present place.
+Each option is rolled out for a short time in the kinematic closed loop with the safety layer; the rest of the path
+counts with the pace of the pursuit. Detours are planned round the places where an obstacle will be when the arm meets
+it. Not in the paper, which plans at the present place.
 """
 
 from __future__ import annotations
@@ -14,36 +14,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..collision.clearance import near_pair_slack
-from ..collision.robot_arrays import HEADER, N_OBSTACLES, OBSTACLES
-from ..control.arm_arrays import pose_at
-from ..control.pursuit import ARRIVED, INDEX
+from ..collision.robot_arrays import HEADER, ROW
+from ..collision.step_certificates import near_pair_slack
+from ..control.arm_arrays import PURSUIT_STATE, pose_at
+from ..control.pursuit import ARRIVED
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
-from ..geometry.shapes import Obstacle, moves
+from ..geometry.shapes import OBSTACLE, Obstacle, moves
 from ..jit import kernel
 from ..safety.guarded_pursuit import guarded_tick
 from ..safety.safety_layer import FREE, safe_velocity
 
 SAME_PLACE = 1e-3
-"""Way [m], or turn in screw length, of a standing obstacle that is a change of the scene."""
+"""Displacement [m, or weighted rad] of a static obstacle from which on the scene has changed."""
 SPACING, MOST_PLACES = 0.04, 10
-"""Way [m] between the places at which a moving obstacle is planned round, and how many of them at most."""
+"""Distance [m] between the places at which a moving obstacle is planned round, and their maximum number."""
 BEFORE, BEHIND = 0.4, 0.8
-"""Seconds about the moment of the first conflict in which an obstacle's places are planned round."""
+"""Seconds before and after the first conflict whose places are planned round."""
 GAIN = 0.3
 """Seconds by which waiting or a detour must arrive sooner than going on."""
 CREEP_TOLERANCE = 1e-3
-"""Room [m] by which a roll-out may come closer than it is or must keep, and still count as safe."""
+"""Slack [m] that a safe roll-out may lose beyond its start."""
 
 
 class Prediction(NamedTuple):
-    """What a roll-out has foreseen.
+    """The outcome of a roll-out.
 
     Attributes:
-        arrival: seconds until the end of the path, estimated behind the horizon.
-        slack: smallest room on the way [m].
-        safe: nothing comes closer than it must keep, or than it is.
-        conflict: seconds until the safety layer first has to change a command; None if never.
+        arrival: seconds until the end of the path, estimated beyond the horizon.
+        slack: smallest slack [m] on the motion.
+        safe: no pair gets closer than its margin, or than it is at the start.
+        conflict: seconds until the safety layer first changes a command; None: never.
     """
 
     arrival: float
@@ -54,22 +54,22 @@ class Prediction(NamedTuple):
 
 @kernel
 def roll_ahead(work, g, path, q, dt, pursuit_state, wait, ticks, wish, out):
-    """Follow a path from q among obstacles that move, after standing still for some ticks.
+    """Follow a path from q among moving obstacles, after standing still for some ticks.
 
     Args:
-        work: see `guarded.guarded_tick`.
-        g: same; the obstacles in it are moved along.
-        path: same.
-        q: (dof,) joints, moved along.
+        work: arm, controller and pursuit, see `arm_arrays`.
+        g: the arm among obstacles, see `robot_arrays`; its obstacles move along.
+        path: (n, 8) poses of the tcp.
+        q: (dof,) joints [rad or m]; they move along.
         dt: seconds per tick.
-        pursuit_state: (4,) of the pursuit.
+        pursuit_state: (4,) state of the pursuit.
         wait: ticks to stand still first, giving way.
-        ticks: to look ahead.
+        ticks: number of ticks to look ahead.
         wish: (dof,) scratch.
         out: (dof,) scratch.
 
     Returns:
-        (True if it arrives, ticks used, smallest room [m], first tick that the safety layer changes or -1).
+        (True if the tool arrives, ticks used, smallest slack [m], first tick that the safety layer changed or -1).
     """
     least, first = math.inf, -1
     for k in range(ticks):
@@ -85,20 +85,20 @@ def roll_ahead(work, g, path, q, dt, pursuit_state, wait, ticks, wish, out):
             first = k
         for i in range(len(q)):
             q[i] += dt * out[i]
-        for o in range(OBSTACLES, OBSTACLES + int(g[HEADER, N_OBSTACLES])):
+        for o in range(ROW.obstacles, ROW.obstacles + int(g[ROW.header, HEADER.obstacles])):
             for c in range(3):
-                g[o, 2 + c] += dt * g[o, 17 + c]
+                g[o, OBSTACLE.center + c] += dt * g[o, OBSTACLE.velocity + c]
     return False, ticks, least, first
 
 
 class Predictor:
-    """Rolls out what an arm may do among obstacles that move.
+    """Rolls out the options of an arm among moving obstacles.
 
     Args:
-        work: its controller and pursuit, see `workspace`.
+        work: the arm, its controller and pursuit, see `arm_arrays`.
         dt: seconds per tick.
         horizon: seconds to look ahead.
-        pace: screw length [m] that a free pursuit makes in a second.
+        pace: path length [m/s] of an undisturbed pursuit.
     """
 
     def __init__(self, work: np.ndarray, dt: float, horizon: float, pace: float):
@@ -107,12 +107,12 @@ class Predictor:
     def ahead(
         self, robot: np.ndarray, path: PosePath, pursuit_state: np.ndarray, q: np.ndarray, wait: float = 0.0
     ) -> Prediction:
-        """What comes of following a path after a wait.
+        """Predict the outcome of following a path after a wait.
 
         Args:
             robot: the arm among the obstacles as they are now, see `robot_arrays`; left as it is.
-            path: to follow.
-            pursuit_state: (4,) of its pursuit; left as it is.
+            path: the path to follow.
+            pursuit_state: (4,) state of its pursuit; left as it is.
             q: (dof,) joints now.
             wait: seconds to stand still first.
         """
@@ -123,12 +123,12 @@ class Predictor:
         )
         arrival = used * self._dt
         if not arrived:
-            arrival += self._left(path, int(after[INDEX]), end) / self._pace
+            arrival += self._left(path, int(after[PURSUIT_STATE.reference]), end) / self._pace
         conflict = None if first < 0 else first * self._dt
         return Prediction(arrival, least, least >= min(before, 0.0) - CREEP_TOLERANCE, conflict)
 
     def _left(self, path: PosePath, index: int, q: np.ndarray) -> float:
-        """Screw length [m] from the tool at joints q to a pose of the path and on to its end."""
+        """Path length [m] from the tool at joints q to a pose of the path and on to its end."""
         from_tool = self._tool(q).distance_to(path[index])
         lengths = path.lengths()
         return math.hypot(from_tool[0], METERS_PER_RADIAN * from_tool[1]) + float(lengths[-1] - lengths[index])
@@ -138,20 +138,36 @@ class Predictor:
 
 
 def is_preferable(one: Prediction, other: Prediction) -> bool:
-    """True if one is safe and the other is not; arrives sooner, if both are; has more room, if none is."""
+    """Return whether one outcome is preferable: safe, else sooner if both are safe, else with more slack.
+
+    Args:
+        one: an outcome.
+        other: the outcome it is compared with.
+    """
     if one.safe != other.safe:
         return one.safe
     return one.arrival + GAIN < other.arrival if one.safe else one.slack > other.slack + CREEP_TOLERANCE
 
 
 def windows(conflict: float, horizon: float) -> Iterator[tuple[float, float]]:
-    """Spans of time whose places are planned round: about the first conflict, then all that is foreseen."""
+    """Yield the time spans [s] whose places are planned round: the first conflict, then the whole horizon.
+
+    Args:
+        conflict: seconds until the first conflict.
+        horizon: seconds that are predicted.
+    """
     yield max(0.0, conflict - BEFORE), conflict + BEHIND
     yield 0.0, horizon
 
 
 def swept(obstacles: Sequence[Obstacle], start: float, end: float) -> list[Obstacle]:
-    """The places of the obstacles that move in a span of time, as obstacles that stand still."""
+    """Return the places of moving obstacles during a time span, as static obstacles.
+
+    Args:
+        obstacles: all obstacles now.
+        start: begin of the span [s from now].
+        end: end of the span [s from now].
+    """
     out = []
     for obstacle in obstacles:
         if moves(obstacle):
@@ -162,7 +178,12 @@ def swept(obstacles: Sequence[Obstacle], start: float, end: float) -> list[Obsta
 
 
 def same_scene(before: Sequence[Obstacle], now: Sequence[Obstacle]) -> bool:
-    """True if the same obstacles are there, those that stand still in the same places."""
+    """Return whether the obstacles are the same, the static ones at the same places.
+
+    Args:
+        before: the obstacles before.
+        now: the obstacles now.
+    """
     if len(before) != len(now):
         return False
     for old, new in zip(before, now, strict=True):

@@ -1,8 +1,8 @@
-"""What plans and follows legs among obstacles, run once before anybody waits for it.
+"""Warm-up: planning and following run once, so that no tick waits for the compiler.
 
-Kernels are compiled when they are first called, or loaded from the disk: half a minute, or half a second, that must
-not be a tick's. None of it may depend on whether a posture of the arm happens to be clear: what touches itself in the
-middle of its joints' ranges would plan nothing. So all but the messages is of a body that is a point at the tool.
+Kernels are compiled at their first call (half a minute in total) or loaded from the disk (half a second). The warm-up
+must not depend on whether some posture of the arm is clear, so it uses a body that is a point at the tool; only the
+messages use the real body.
 """
 
 from __future__ import annotations
@@ -23,50 +23,50 @@ from ..planning.joint_space_motion import plan_joint_space
 from ..planning.planning_scene import PlanningScene
 from ..planning.settings import JointSearchSettings, PlanSettings
 from ..robot.arm import Arm
-from ..robot.body import FRAME, RADIUS, WIDTH, Body
+from ..robot.body import BODY, Body
 from ..safety.safety_layer import SafetyLayer
 from .command import ReactiveSettings
 from .reactive_planner import ReactivePlanner
 
 STEP, STEPS = 0.005, 4
-"""Steps of the leg [m], and how many."""
+"""Length [m] of the motion's steps, and their number."""
 FAR = Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.0, 0.0, 50.0]), name="far")
 SLOW = np.array([0.0, 0.0, 1e-3])
-"""Velocity [m/s] of an obstacle that moves, but not far."""
+"""Velocity [m/s] of an obstacle that hardly moves."""
 SHORT = PlanSettings(search=JointSearchSettings(seeds=1, targets=1, postures=1, rounds=1, shortcuts=1))
 
 
 def warm_up(arm: Arm, body: Body) -> None:
-    """Compile, or load from the cache, what planning and following may need; what is compiled is for any arm.
+    """Compile all kernels of planning and following, or load them from the cache; they serve any arm.
 
     Args:
         arm: the arm.
         body: its capsules.
     """
     q = 0.5 * (np.maximum(arm.lower, -1.0) + np.minimum(arm.upper, 1.0))
-    row = np.zeros(WIDTH)
-    row[FRAME], row[RADIUS] = arm.dof - 1.0, 0.001
-    point, path = Body(row[None], ("point",)), _leg(arm.fk(q))
+    row = np.zeros(BODY.width)
+    row[BODY.frame], row[BODY.radius] = arm.dof - 1.0, 0.001
+    point, path = Body(row[None], ("point",)), _sideways(arm.fk(q))
     _algebra(path.dqs)
     for seen in ((FAR,), (replace(FAR, velocity=SLOW),)):
         _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT)), q, path, seen)
     _search(arm, point, q)
     SafetyLayer((arm,), (point,), (FAR,), SHORT.motion.dt)(q, np.zeros(arm.dof))
     Controller(arm)(q, path[-1])
-    # what names what is in the way
+    # the queries behind messages
     scene = PlanningScene.of(arm, body, (FAR,), SHORT)
     scene.tightest(q)
     scene.tightest_of_tool(path[0])
 
 
-def _leg(start: Pose) -> PosePath:
-    """A short way up."""
+def _sideways(start: Pose) -> PosePath:
+    """A short path upwards."""
     up = Pose.from_position_quaternion([0.0, 0.0, STEPS * STEP]) @ start
     return final_path(start, imitated_path(resampled(screw_path(start, up, STEP), STEP), up), 1)
 
 
 def _algebra(x: np.ndarray) -> None:
-    """What is called from anywhere with arrays that may be written to or not, which is another type each.
+    """Compile the pose algebra for writable and for read-only arrays, which are different types.
 
     Args:
         x: (n, 8) poses, read-only.
@@ -95,7 +95,7 @@ def _follow(planner: ReactivePlanner, q: np.ndarray, path: PosePath, seen: tuple
 
 
 def _search(arm: Arm, point: Body, q: np.ndarray) -> None:
-    """A search in joint space, to where the arm is: whatever it can reach, it can reach that."""
+    """Search in joint space for a path to the present pose, which any arm can reach."""
     here, motion = arm.fk(q), SHORT.motion
     scene, work = (
         PlanningScene.of(arm, point, (FAR,), SHORT),

@@ -1,1 +1,1 @@
-"""One arm: its chain, its capsules, read from URDF and MJCF."""
+"""Arms: kinematic chains and link capsules, read from URDF and MJCF."""

@@ -1,4 +1,4 @@
-"""Serial arms: forward kinematics, body Jacobian and limits, compiled; read from MuJoCo models or URDF."""
+"""Serial arms: compiled forward kinematics, body Jacobian and limits; read from MuJoCo models or URDF."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import BadModel, BadShape, NotFinite
 from ..geometry.pose import Pose
 from .chain_readers import ChainData, chain_from_mujoco, chain_from_urdf
-from .kinematics import FRAME, forward_into, forward_jacobian_into
+from .kinematics import CHAIN, FRAME, forward_into, forward_jacobian_into
 
 MAX_DOF = 16
 
@@ -31,13 +31,14 @@ class Arm:
     Attributes:
         name: for messages.
         joint_names: (dof,) in order from the base.
-        chain: (dof + 1, 8), see the module `chain`.
+        chain: (dof + 1, 8), see the module `kinematics`.
         lower: (dof,) lower joint limits [rad or m]; -inf for a continuous joint.
         upper: (dof,) upper joint limits [rad or m].
         velocity_limits: (dof,) largest joint speeds [rad/s or m/s].
 
     Raises:
         BadModel: no joints, too many, limits out of order, or numbers that are not finite.
+        BadShape: an array that does not match the number of joints.
     """
 
     name: str
@@ -51,7 +52,7 @@ class Arm:
         dof = len(self.joint_names)
         if not 1 <= dof <= MAX_DOF:
             raise BadModel(self.name, "joints", f"has {dof}; allowed are 1 to {MAX_DOF}")
-        shapes = {"chain": (dof + 1, 8), "lower": (dof,), "upper": (dof,), "velocity_limits": (dof,)}
+        shapes = {"chain": (dof + 1, CHAIN.width), "lower": (dof,), "upper": (dof,), "velocity_limits": (dof,)}
         for key, shape in shapes.items():
             value = _readonly(getattr(self, key))
             if value.shape != shape:
@@ -72,39 +73,44 @@ class Arm:
 
     @property
     def limits(self) -> np.ndarray:
-        """(3, dof): lower and upper limits, largest speeds, as the kernels take them."""
+        """Lower and upper limits and largest speeds (3, dof), in the form the kernels take."""
         return np.stack([self.lower, self.upper, self.velocity_limits])
 
     def fk(self, q: ArrayLike) -> Pose:
-        """Pose of the tcp in the world at joint positions q (dof,)."""
+        """Return the pose of the tcp in the world at joint positions q (dof,) [rad or m]."""
         out = np.empty(8)
-        forward_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), out)
+        forward_into(self.chain, self.checked(q), np.empty((self.dof, FRAME.width)), out)
         return Pose(out)
 
     def jacobian(self, q: ArrayLike) -> np.ndarray:
-        """Jacobian (6, dof) of the tcp's body twist, rows (v, omega); Pinocchio's LOCAL frame."""
+        """Return the Jacobian (6, dof) of the tcp's body twist, rows (v, omega); Pinocchio's LOCAL frame."""
         return self.fk_jacobian(q)[1]
 
     def fk_jacobian(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Dual quaternion (8,) of the tcp and body Jacobian (6, dof) in one pass."""
+        """Return the dual quaternion (8,) of the tcp and the body Jacobian (6, dof) in one pass."""
         x, jacobian = np.empty(8), np.empty((6, self.dof))
-        forward_jacobian_into(self.chain, self.checked(q), np.empty((self.dof, FRAME)), jacobian, x)
+        forward_jacobian_into(self.chain, self.checked(q), np.empty((self.dof, FRAME.width)), jacobian, x)
         return x, jacobian
 
     def with_tool(self, tcp_from_tool: Pose) -> Arm:
-        """The same arm with another frame of the hand as its tcp."""
+        """Return the arm with another frame of the hand as its tcp."""
         row = self.chain[-1]
-        tool = Pose.from_position_quaternion(row[4:7], row[:4]) @ tcp_from_tool
-        chain = np.vstack([self.chain[:-1], [*tool.quaternion, *tool.position, row[7]]])
+        tcp = Pose.from_position_quaternion(row[CHAIN.offset : CHAIN.kind], row[CHAIN.rotation : CHAIN.offset])
+        tool = tcp @ tcp_from_tool
+        chain = np.vstack([self.chain[:-1], [*tool.quaternion, *tool.position, row[CHAIN.kind]]])
         return replace(self, chain=chain)
 
     def margin(self, q: ArrayLike) -> float:
-        """Smallest distance [rad or m] of q (dof,) to a joint limit; negative outside."""
+        """Return the smallest distance [rad or m] of q (dof,) to a joint limit; negative outside."""
         q = np.asarray(q, dtype=np.float64)
         return float(np.minimum(q - self.lower, self.upper - q).min())
 
     def checked(self, q: ArrayLike) -> np.ndarray:
-        """Joint positions (dof,) as float64, if they have that shape and are finite."""
+        """Return joint positions (dof,) as float64.
+
+        Raises:
+            BadShape, NotFinite: another shape, or a number that is not finite.
+        """
         q = np.asarray(q, dtype=np.float64)
         if q.shape != (self.dof,):
             raise BadShape(f"{self.name}: q", q.shape, f"({self.dof},)")
@@ -121,14 +127,17 @@ class Arm:
         velocity_limits: ArrayLike,
         name: str = "mujoco arm",
     ) -> Arm:
-        """The chain from the world to a site of a compiled MuJoCo model.
+        """Read the chain from the world to a site of a compiled MuJoCo model.
 
         Args:
             model: `mujoco.MjModel`; MuJoCo itself is not imported.
             joint_names: all moving joints between the world and the site, from the base on.
             site: name of the tool frame.
-            velocity_limits: (dof,) or scalar [rad/s]: MJCF does not hold them.
+            velocity_limits: (dof,) or scalar [rad/s or m/s]: MJCF does not contain velocity limits.
             name: for messages.
+
+        Raises:
+            BadModel: unknown joints or site, or a model that is no such chain.
         """
         return Arm._from_data(name, chain_from_mujoco(model, joint_names, site, name), velocity_limits)
 
@@ -141,14 +150,17 @@ class Arm:
         velocity_limits: ArrayLike | None = None,
         name: str | None = None,
     ) -> Arm:
-        """The chain from the base to a frame of a URDF file, read by Pinocchio.
+        """Read the chain from the base to a frame of a URDF file, with Pinocchio.
 
         Args:
             path: URDF file; meshes are not read.
             tcp_frame: name of a link or joint frame: the tool frame.
-            world_from_base: where the root link stands; default the origin.
-            velocity_limits: (dof,) or scalar [rad/s]; default the file's own.
-            name: for messages; default the file's name.
+            world_from_base: pose of the root link; default: the identity.
+            velocity_limits: (dof,) or scalar [rad/s or m/s]; default: those of the file.
+            name: for messages; default: the file name.
+
+        Raises:
+            BadModel: no such file or frame, or a model that is no such chain.
         """
         data = chain_from_urdf(path, tcp_frame, world_from_base)
         return Arm._from_data(name or Path(path).name, data, velocity_limits)

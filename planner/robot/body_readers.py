@@ -1,6 +1,6 @@
 """Readers of robot models: capsules that contain an arm's collision geometry, from MuJoCo or URDF.
 
-Not in the paper: it moves a point.
+Not in the paper: the paper moves a point.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..geometry.hulls import corner_points
 from ..geometry.pose import Pose
 from ..geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from .arm import Arm
-from .body import FRAME, RADIUS, A, B, Body
+from .body import BODY, Body
 from .chain_readers import mujoco_bodies, mujoco_id, mujoco_pose, pinocchio_axis, turn_z_to
 from .kinematics import PRISMATIC, REVOLUTE
 from .link_capsules import Geometry, Joint, Link, RobotModel, Split, body_of, joined, joint_frames, moved, placed
@@ -26,23 +26,24 @@ NOTHING = Geometry([], np.zeros((0, 3)))
 
 
 def body_from_mujoco(model: Any, arm: Arm, joint_names: Sequence[str], *, split: Split = None) -> Body:
-    """Capsules that contain the collision geometry of an arm, and of all that hangs on it, in a compiled model.
+    """Cover the collision geometry of an arm, and of everything attached to the arm, in a compiled model.
 
-    Static bodies on the way from the world to the first joint count as the arm's base, in frame -1, whose
-    coordinates are the world's. What stands beside them, such as a pedestal, is an obstacle.
+    Static bodies between the world and the first joint count as the arm's base, in frame -1, whose coordinates are the
+    world's. Bodies beside them, such as a pedestal, are obstacles.
 
     Args:
         model: `mujoco.MjModel`, read by its named fields; MuJoCo itself is not imported.
         arm: read from the same model.
         joint_names: of the arm in the model.
-        split: number of capsules (1 to 3) of every piece, or of some by name; default: as many as pay.
+        split: number of capsules (1 to 3) of every piece, or of some pieces by name; default: as many as pay off.
 
     Returns:
-        Capsules named "link0" (the base) to "link7" for seven joints, "hand" for what is welded to the last
-        link and "fingers" for what moves on it, over its whole range.
+        Capsules named "link0" (the base) to "link7" for seven joints, "hand" for everything welded to the last link and
+        "fingers" for the parts that move on it, over their whole range.
 
     Raises:
-        BadModel: no such joints, not this arm, or geometry that cannot be covered.
+        BadModel: unknown joints, another arm, or geometry that cannot be covered.
+        UnknownName: a piece in `split` that the arm lacks.
     """
     source = arm.name
     wanted = [mujoco_id(model, "joint", name, source) for name in joint_names]
@@ -69,19 +70,20 @@ def body_from_mujoco(model: Any, arm: Arm, joint_names: Sequence[str], *, split:
 def body_from_urdf(
     path: str | Path, arm: Arm, *, package_dirs: Sequence[str | Path] | None = None, split: Split = None
 ) -> Body:
-    """Capsules that contain the collision geometry of an arm, and of all that hangs on it, in a URDF file.
+    """Cover the collision geometry of an arm, and of everything attached to the arm, in a URDF file.
 
     Args:
         path: URDF file.
-        arm: read from the same file; it may stand anywhere.
-        package_dirs: folders in which the packages of `package://` lie; default: those above the file.
-        split: as of `body_from_mujoco`.
+        arm: read from the same file; its base pose is free.
+        package_dirs: folders of the packages of `package://`; default: the folders above the file.
+        split: see `body_from_mujoco`.
 
     Returns:
         As `body_from_mujoco`; everything fixed to the root link is "link0".
 
     Raises:
-        BadModel: no such file, meshes that are missing, no collision geometry, or not this arm.
+        BadModel: no such file, missing meshes, no collision geometry, or another arm.
+        UnknownName: a piece in `split` that the arm lacks.
     """
     import pinocchio as pin
 
@@ -112,26 +114,39 @@ def body_from_urdf(
 
 
 def resting_pairs(arm: Arm, body: Body, distance: float = 0.0) -> list[tuple[int, int]]:
-    """Pairs (i, j), i < j, of an arm's own capsules that no check may look at.
+    """Return the pairs (i, j), i < j, of an arm's own capsules that self-collision checks must skip.
 
-    They are in the same or in neighboring frames, where they always touch, or they are closer than `distance` [m] with
-    every joint in the middle of its range (at zero if it has none), where real links are not: only the capsules are.
+    Such capsules are in the same or in neighboring frames, where they always touch, or they are close with every joint
+    in the middle of its range (at zero if it has none): there the real links are apart, so only the capsules touch.
+
+    Args:
+        arm: the arm.
+        body: its capsules.
+        distance: largest distance [m] of two capsules that counts as close.
     """
     free = ~(np.isfinite(arm.lower) & np.isfinite(arm.upper))
     middle = np.where(free, 0.0, 0.5 * (np.where(free, 0.0, arm.lower) + np.where(free, 0.0, arm.upper)))
     poses = [Pose.identity(), *joint_frames(arm, middle)]
-    ends = [[moved(poses[int(row[FRAME]) + 1], row[first : first + 3]) for first in (A, B)] for row in body.rows]
+    placed = [(poses[int(row[BODY.frame]) + 1], row) for row in body.rows]
+    ends = [[moved(pose, row[first : first + 3]) for first in (BODY.a, BODY.b)] for pose, row in placed]
     pairs = []
     for i in range(len(body)):
         for j in range(i + 1, len(body)):
-            gap = segment_distance(*ends[i], *ends[j]) - body.rows[i, RADIUS] - body.rows[j, RADIUS]
-            if abs(body.rows[i, FRAME] - body.rows[j, FRAME]) <= 1 or gap <= distance:
+            gap = segment_distance(*ends[i], *ends[j]) - body.rows[i, BODY.radius] - body.rows[j, BODY.radius]
+            if abs(body.rows[i, BODY.frame] - body.rows[j, BODY.frame]) <= 1 or gap <= distance:
                 pairs.append((i, j))
     return pairs
 
 
 def segment_distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
-    """Distance [m] of the segments from a to b and from c to d, points (3,)."""
+    """Return the distance [m] of two segments.
+
+    Args:
+        a: (3,) start of the first segment [m].
+        b: (3,) its end.
+        c: (3,) start of the second segment [m].
+        d: (3,) its end.
+    """
 
     def to_segment(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
         along = end - start
@@ -150,7 +165,7 @@ def segment_distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray)
 
 
 def _solid(model: Any, body: int) -> list[int]:
-    """Geoms of a body that can touch something."""
+    """Return the geoms of a body that can collide."""
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     return [geom for geom in range(first, first + count) if model.geom_contype[geom] or model.geom_conaffinity[geom]]
 
@@ -166,7 +181,7 @@ def _mujoco_joint(model: Any, joint: int) -> Joint:
 def _mujoco_geometry(model: Any, geom: int) -> Geometry:
     pose = mujoco_pose(model.geom_pos[geom], model.geom_quat[geom])
     kind, (x, y, z) = int(model.geom_type[geom]), (float(size) for size in model.geom_size[geom])
-    # mjGEOM_SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF; planes and height fields are no links
+    # mjGEOM_SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF; planes and height fields are never links
     if kind in (7, 8):
         mesh = int(model.geom_dataid[geom])
         first = int(model.mesh_vertadr[mesh])
@@ -190,7 +205,7 @@ def _geometry_of(shape: Shape) -> Geometry:
 
 
 def _pinocchio_parts(model: Any, geometry: Any, chain: list[int], world_from_root: Pose, source: Path) -> list[Link]:
-    """A part per joint, number 0 being the root, with the link that the joint moves; then one per link welded on."""
+    """Return one part per joint (number 0: the root) with the link the joint moves, then one per link welded on."""
     joined_links: dict[tuple[int, int], list[Geometry]] = {}
     for item in geometry.geometryObjects:
         pose = Pose.from_matrix(item.placement.homogeneous)
@@ -224,7 +239,7 @@ def _pinocchio_joint(model: Any, joint: int, source: Path) -> Joint:
 
 
 def _pinocchio_geometry(item: Any, source: Path) -> Geometry:
-    """Of one collision element, in its own frame; hpp-fcl and coal name their classes alike."""
+    """Return the geometry of a collision element in its own frame; hpp-fcl and coal use the same class names."""
     form, name = item.geometry, type(item.geometry).__name__
     if name == "Sphere":
         return _geometry_of(Sphere(form.radius))

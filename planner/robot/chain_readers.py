@@ -14,18 +14,18 @@ from ..geometry.pose import Pose
 from .kinematics import PRISMATIC, REVOLUTE
 
 FARTHEST = 100.0
-"""A link longer than this [m] is a mistake."""
+"""Largest plausible length of a link [m]."""
 
 
 class ChainData(NamedTuple):
-    """What a robot model says of an arm.
+    """The serial chain of a robot model.
 
     Attributes:
         joint_names: (dof,).
-        chain: (dof + 1, 8), see `chain`.
+        chain: (dof + 1, 8), see `kinematics`.
         lower: (dof,) [rad or m], -inf for a continuous joint.
         upper: (dof,) [rad or m].
-        velocity: (dof,) [rad/s or m/s], NaN where the model does not say.
+        velocity: (dof,) [rad/s or m/s], NaN where the model lacks a limit.
     """
 
     joint_names: tuple[str, ...]
@@ -46,7 +46,7 @@ class _ChainBuilder:
         self._pending = self._pending @ displacement
 
     def add_joint(self, axis: ArrayLike, position: ArrayLike, kind: float, rest: float) -> None:
-        """Append a joint along `axis` through `position`; at q = rest it displaces nothing."""
+        """Append a joint along `axis` through `position`; at q = rest its displacement is zero."""
         turn = turn_z_to(np.asarray(axis, dtype=np.float64))
         body_from_joint = Pose.from_position_quaternion(position, turn)
         back = Pose.from_yaw([0, 0, 0], -rest)
@@ -64,7 +64,7 @@ class _ChainBuilder:
 
 
 def turn_z_to(axis: np.ndarray) -> np.ndarray:
-    """Quaternion that turns z to a direction by the smallest angle."""
+    """Return the quaternion (4,) wxyz of the smallest rotation from z to a direction (3,)."""
     axis = axis / np.linalg.norm(axis)
     if axis[2] < -1.0 + 1e-12:
         return np.array([0.0, 1.0, 0.0, 0.0])
@@ -73,10 +73,16 @@ def turn_z_to(axis: np.ndarray) -> np.ndarray:
 
 
 def chain_from_mujoco(model: Any, joint_names: Sequence[str], site: str, source: str) -> ChainData:
-    """The chain from the world to a site of a compiled `mujoco.MjModel`, read by its named fields.
+    """Read the chain from the world to a site of a compiled model.
+
+    Args:
+        model: `mujoco.MjModel`, read by its named fields.
+        joint_names: all moving joints between the world and the site, from the base on.
+        site: name of the tool frame.
+        source: name of the model for messages.
 
     Raises:
-        BadModel: the joints are not exactly the moving joints between the world and the site.
+        BadModel: the joints are not exactly the moving joints between the world and the site, or the site is unknown.
     """
     site_id = mujoco_id(model, "site", site, source)
     wanted = [mujoco_id(model, "joint", joint, source) for joint in joint_names]
@@ -108,10 +114,15 @@ def chain_from_mujoco(model: Any, joint_names: Sequence[str], site: str, source:
 
 
 def chain_from_urdf(path: str | Path, tcp_frame: str, world_from_base: Pose | None = None) -> ChainData:
-    """The chain from the root link (standing at `world_from_base`) to a frame of a URDF, by Pinocchio.
+    """Read the chain from the root link to a frame of a URDF file, with Pinocchio.
+
+    Args:
+        path: URDF file.
+        tcp_frame: name of the tool frame.
+        world_from_base: pose of the root link; default: the identity.
 
     Raises:
-        BadModel: no such file or frame, or a joint that neither turns nor slides.
+        BadModel: no such file or frame, or a joint that is neither revolute nor prismatic.
     """
     import pinocchio as pin
 
@@ -151,7 +162,7 @@ def chain_from_urdf(path: str | Path, tcp_frame: str, world_from_base: Pose | No
 
 
 def _check_placement(source: Path, name: str, matrix: np.ndarray) -> None:
-    """Refuse numbers that the loader lets pass: not finite, farther than 100 m, not a rotation."""
+    """Refuse numbers the loader accepts: not finite, farther than 100 m, not a rotation."""
     if not (np.isfinite(matrix).all() and np.abs(matrix[:3, 3]).max() <= FARTHEST):
         raise BadModel(source, name, f"its origin is not finite or farther than {FARTHEST:g} m")
     if np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max() > 1e-6:
@@ -159,12 +170,27 @@ def _check_placement(source: Path, name: str, matrix: np.ndarray) -> None:
 
 
 def mujoco_pose(position: np.ndarray, wxyz: np.ndarray) -> Pose:
-    """Pose of a position (3,) [m] and a quaternion (4,) as MuJoCo keeps them, normalized."""
+    """Return the pose of a position and a quaternion of a MuJoCo model.
+
+    Args:
+        position: (3,) [m].
+        wxyz: (4,) quaternion, normalized here.
+    """
     return Pose.from_position_quaternion(position, wxyz / np.linalg.norm(wxyz))
 
 
 def mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
-    """Index of a named thing ("joint", "site" …) of a compiled model."""
+    """Return the index of a named element of a compiled model.
+
+    Args:
+        model: `mujoco.MjModel`.
+        kind: "joint", "site" …
+        name: of the element.
+        source: name of the model for messages.
+
+    Raises:
+        BadModel: the model lacks the element.
+    """
     try:
         return int(getattr(model, kind)(name).id)
     except KeyError:
@@ -172,7 +198,12 @@ def mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
 
 
 def mujoco_bodies(model: Any, body: int) -> list[int]:
-    """The bodies from the world (excluded) to a body (included)."""
+    """Return the bodies from the world (excluded) to a body (included).
+
+    Args:
+        model: `mujoco.MjModel`.
+        body: index of the last body.
+    """
     path = []
     while body != 0:
         path.append(body)
@@ -191,13 +222,25 @@ def _pinocchio_joints(model: Any, frame: Any) -> list[int]:
 
 
 def pinocchio_axis(model: Any, joint: int, source: Path) -> tuple[np.ndarray, np.ndarray, float]:
-    """Axis, position and kind of a joint, from its own column of the Jacobian in its own frame."""
+    """Read a joint's axis from its own column of the Jacobian in its own frame.
+
+    Args:
+        model: `pinocchio.Model`.
+        joint: index of the joint.
+        source: the file, for messages.
+
+    Returns:
+        Axis (3,), position (3,) [m] and kind (REVOLUTE or PRISMATIC).
+
+    Raises:
+        BadModel: the joint is neither revolute nor prismatic.
+    """
     import pinocchio as pin
 
     if model.joints[joint].nv != 1:
         raise BadModel(source, f"joint {model.names[joint]!r}", "neither turns nor slides")
     jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-    # a model of one joint gives a vector
+    # for a model of one joint Pinocchio returns a vector
     column = jacobian.reshape(6, -1)[:, model.joints[joint].idx_v]
     if not abs(np.linalg.norm(column) - 1.0) < 1e-6:
         raise BadModel(source, f"joint {model.names[joint]!r}", "its axis is not a direction")

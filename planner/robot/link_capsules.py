@@ -1,9 +1,9 @@
-"""The links of a robot as its model's readers describe them, and the capsules that contain them.
+"""The parts of a robot as described by the model readers, and the capsules that contain them.
 
-What hangs on a link by joints that are not the arm's, like a gripper's fingers, is covered over the whole range
-of those joints.
+Parts attached by joints that are not the arm's, like a gripper's fingers, are covered over the whole range of those
+joints.
 
-Not in the paper: it moves a point.
+Not in the paper: the paper moves a point.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from ..geometry.pose import Pose
 from ..geometry.shapes import Sphere, hull_corners
 from .arm import Arm
 from .body import Body
-from .kinematics import PRISMATIC, REVOLUTE
+from .kinematics import CHAIN, PRISMATIC, REVOLUTE
 
 Split = int | Mapping[str, int] | None
 SMALLER, CLOSER = 0.85, 0.75
-"""A link gets one capsule more if that brings the volume, or how far they stick out, below this share."""
+"""A link gets one more capsule if that reduces the volume, or the protrusion, to less than this fraction."""
 FINGER_EXCESS = 0.006
-"""How far [m] the capsules of fingers may stick out, more or less: fingers go close to things."""
+"""Approximate largest protrusion [m] of finger capsules, small because fingers go close to objects."""
 STEP = math.radians(15.0)
-"""Largest step in which a turning finger is swept."""
+"""Largest step [rad] in which a revolute finger joint is swept."""
 SAME = 1e-6
-"""Joints of a model and of the arm are the same if they agree so well [m, rad]."""
+"""Tolerance [m, rad] within which joints of a model and of the arm coincide."""
 
 
 class Joint(NamedTuple):
-    """A joint that is not the arm's, in the frame of its part.
+    """A joint that does not belong to the arm, in the frame of its part.
 
     Attributes:
         kind: REVOLUTE, PRISMATIC or NaN for any other.
         axis: (3,) unit.
         position: (3,) a point on the axis [m].
-        low: lowest position, less the reference [rad or m]; -inf without a limit.
-        high: highest.
+        low: lowest position relative to the reference [rad or m]; -inf without a limit.
+        high: highest position relative to the reference [rad or m]; inf without a limit.
     """
 
     kind: float
@@ -53,11 +53,11 @@ class Joint(NamedTuple):
 
 
 class Geometry(NamedTuple):
-    """What a part is made of, in its frame.
+    """Geometry of a part, in its frame.
 
     Attributes:
-        exact: capsules, and balls whose two ends are the same.
-        points: (n, 3) [m]; their hull contains all the rest.
+        exact: capsules, and balls as capsules with coincident ends.
+        points: (n, 3) [m]; their hull contains all other geometry.
     """
 
     exact: Cover
@@ -65,15 +65,15 @@ class Geometry(NamedTuple):
 
 
 class Link(NamedTuple):
-    """Geometry that moves as one.
+    """A part of a robot: geometry that moves as one.
 
     Attributes:
         name: in the model, for messages.
-        parent: index of the part that it hangs on, lower than its own; -1: the world.
+        parent: index of the part this one is attached to, lower than its own; -1: the world.
         pose: `parent_from_part` with all joints at the reference.
-        frame: the arm's joint that moves it, -1 for the arm's base; None: it is no link of the arm.
-        joints: others that move it, the one next to the parent first.
-        geometry: what it is made of.
+        frame: index of the arm's joint that moves the part, -1 for the arm's base; None: not a link of the arm.
+        joints: other joints that move the part, nearest to the parent first.
+        geometry: of the part.
     """
 
     name: str
@@ -85,13 +85,13 @@ class Link(NamedTuple):
 
 
 class RobotModel(NamedTuple):
-    """What a reader found.
+    """A robot model as read from a file or a compiled model.
 
     Attributes:
         source: for messages.
         parts: parents first.
         reference: (dof,) positions of the arm's joints at which the parts' poses hold [rad or m].
-        joints: per joint of the arm its part, and its axis (3,) and a point on it (3,) in the part's frame.
+        joints: per joint of the arm: index of its part, axis (3,) and a point on the axis (3,) in the part's frame [m].
     """
 
     source: str
@@ -101,13 +101,13 @@ class RobotModel(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """What is covered together.
+    """Geometry covered together.
 
     Attributes:
         name: of its capsules.
-        frame: that it moves with; -1: the base's, which is the world.
+        frame: index of the frame the piece moves with; -1: the base's, which is the world.
         pose: `frame_from_piece`.
-        geometry: in the piece's own frame, so that the fit does not depend on where the arm stands.
+        geometry: in the piece's own frame, so that the fit does not depend on the arm's base pose.
     """
 
     name: str
@@ -117,32 +117,49 @@ class _Piece(NamedTuple):
 
 
 def joint_frames(arm: Arm, q: np.ndarray) -> list[Pose]:
-    """`world_from_frame` of every joint's frame once the joint has moved, at joint positions q (dof,)."""
+    """Return `world_from_frame` of every joint's frame after the joint has moved.
+
+    Args:
+        arm: the arm.
+        q: (dof,) joint positions [rad or m].
+    """
     poses, pose = [], Pose.identity()
     for row, value in zip(arm.chain[:-1], q, strict=True):
         turned = Pose.from_yaw([0.0, 0.0, 0.0], value)
-        step = turned if row[7] == REVOLUTE else Pose.from_position_quaternion([0.0, 0.0, value])
-        pose = pose @ Pose.from_position_quaternion(row[4:7], row[:4]) @ step
+        step = turned if row[CHAIN.kind] == REVOLUTE else Pose.from_position_quaternion([0.0, 0.0, value])
+        fixed = Pose.from_position_quaternion(row[CHAIN.offset : CHAIN.kind], row[CHAIN.rotation : CHAIN.offset])
+        pose = pose @ fixed @ step
         poses.append(pose)
     return poses
 
 
 def moved(a_from_b: Pose, points: np.ndarray) -> np.ndarray:
-    """Points (..., 3) of frame b in frame a [m]."""
+    """Transform points from frame b to frame a.
+
+    Args:
+        a_from_b: pose of b in a.
+        points: (..., 3) [m].
+    """
     return points @ a_from_b.rotation.T + a_from_b.position
 
 
 def joined(geometries: list[Geometry]) -> Geometry:
-    """Several as one."""
+    """Merge several geometries of one frame."""
     exact = [capsule for geometry in geometries for capsule in geometry.exact]
     return Geometry(exact, np.vstack([np.zeros((0, 3)), *(geometry.points for geometry in geometries)]))
 
 
 def body_of(robot: RobotModel, arm: Arm, split: Split) -> Body:
-    """Capsules that contain a robot's parts, named and placed as `body_models` says.
+    """Cover a robot's parts with capsules, named and placed as `body_readers` describes.
+
+    Args:
+        robot: the model that was read.
+        arm: the arm, read from the same model.
+        split: number of capsules (1 to 3) of every piece, or of some pieces by name; None: as many as pay off.
 
     Raises:
-        BadModel: the arm is another one, or geometry encloses no volume.
+        BadModel: another arm, no collision geometry, or geometry that encloses no volume.
+        UnknownName: a piece in `split` that the arm lacks.
     """
     world = _world_from_parts(robot.parts)
     frames = [Pose.identity(), *joint_frames(arm, robot.reference)]
@@ -173,7 +190,7 @@ def _world_from_parts(parts: list[Link]) -> list[Pose]:
 
 
 def _pieces(robot: RobotModel, world: list[Pose], frames: list[Pose]) -> list[_Piece]:
-    """Every link by itself, all that is welded to the last one, and all that moves on it; base first."""
+    """Group every link by itself, the parts welded to the last link, and the parts that move on it; base first."""
     parts, last = robot.parts, len(frames) - 2
     owner: list[int | None] = []
     moving: list[bool] = []
@@ -205,13 +222,18 @@ def _pieces(robot: RobotModel, world: list[Pose], frames: list[Pose]) -> list[_P
 
 
 def placed(a_from_b: Pose, geometry: Geometry) -> Geometry:
-    """Geometry of frame b in frame a."""
+    """Transform geometry from frame b to frame a.
+
+    Args:
+        a_from_b: pose of b in a.
+        geometry: in frame b.
+    """
     exact = [(moved(a_from_b, a), moved(a_from_b, b), radius) for a, b, radius in geometry.exact]
     return Geometry(exact, moved(a_from_b, geometry.points))
 
 
 def _swept(robot: RobotModel, k: int) -> np.ndarray:
-    """Points whose hull contains a part and all that hangs on it, in its frame, wherever the other joints are."""
+    """Return points in a part's frame; their hull contains the part and its attachments at all joint positions."""
     part = robot.parts[k]
     clouds = [part.geometry.points]
     for a, b, radius in part.geometry.exact:
@@ -224,14 +246,27 @@ def _swept(robot: RobotModel, k: int) -> np.ndarray:
 
 
 def _through(robot: RobotModel, part: Link, points: np.ndarray) -> np.ndarray:
-    """Points of a part, swept by its joints, in the parent's frame."""
+    """Return the points of a part, swept by its joints, in the parent's frame."""
     for joint in reversed(part.joints):
         points = _fewer(sweep(joint, points, robot.source, part.name))
     return moved(part.pose, points)
 
 
 def sweep(joint: Joint, points: np.ndarray, source: str, name: str) -> np.ndarray:
-    """Points whose hull contains all that a joint moves the given ones through."""
+    """Sweep points by a joint over its whole range.
+
+    Args:
+        joint: revolute, or prismatic with limits.
+        points: (n, 3) in the frame of the joint's part [m].
+        source: name of the model for messages.
+        name: of the part, for messages.
+
+    Returns:
+        Points (k, 3) [m] whose hull contains all the points at all joint positions.
+
+    Raises:
+        BadModel: any other joint.
+    """
     span = joint.high - joint.low
     if joint.kind == PRISMATIC and math.isfinite(span):
         return np.vstack([points + joint.low * joint.axis, points + joint.high * joint.axis])
@@ -245,7 +280,7 @@ def sweep(joint: Joint, points: np.ndarray, source: str, name: str) -> np.ndarra
     axial = np.outer(arms @ joint.axis, joint.axis)
     radial = arms - axial
     side = np.cross(joint.axis, radial)
-    # the corners of a polygon around the arc, whose ends lie on it
+    # the corners of a polygon circumscribed about the arc, whose ends lie on the arc
     turns = [(low, 1.0), *((low + (2 * k + 1) * half, 1.0 / math.cos(half)) for k in range(count)), (low + span, 1.0)]
     arcs = [axial + scale * (math.cos(angle) * radial + math.sin(angle) * side) for angle, scale in turns]
     return joint.position + np.vstack(arcs)

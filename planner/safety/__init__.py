@@ -1,1 +1,1 @@
-"""The filter below every command."""
+"""The filter of every command."""

@@ -1,11 +1,11 @@
-"""Compiled closed loop with the safety layer in it: a path followed by an arm that is kept clear at every tick."""
+"""Compiled closed loop with the safety layer in it: an arm follows a path and keeps clear at every tick."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..collision.robot_arrays import DESIRED
-from ..control.arm_arrays import LIMITS
+from ..collision.robot_arrays import ROW
+from ..control.arm_arrays import ARM
 from ..control.controller import tick
 from ..control.pursuit import FOLLOWING, STALLED, pursue
 from ..jit import kernel
@@ -14,11 +14,21 @@ from .safety_layer import BLOCKED, FREE, safe_velocity
 
 @kernel
 def safe_tick(work, g, q, target, sign, dt, out):
-    """One control step towards a pose (8,), safe: speeds into `out` (dof,); the way round taken.
+    """Do one safe control step towards a pose: `controller.tick` and the safety layer in one call.
 
-    `controller.tick` and the safety layer in one call.
+    Args:
+        work: arm and controller, see `arm_arrays`.
+        g: the arm among obstacles, see `robot_arrays`.
+        q: (dof,) joints.
+        target: (8,) pose of the tcp to approach.
+        sign: direction of rotation so far, see `controller.choose_sign`.
+        dt: duration of the step [s].
+        out: (dof,) safe joint speeds, the result.
+
+    Returns:
+        The direction of rotation taken.
     """
-    wish = g[DESIRED]
+    wish = g[ROW.desired]
     sign = tick(work, q, target, sign, wish[: len(q)])
     safe_velocity(g, q, wish[: len(q)], dt, out)
     return sign
@@ -26,17 +36,20 @@ def safe_tick(work, g, q, target, sign, dt, out):
 
 @kernel
 def guarded_tick(work, g, path, q, dt, pursuit_state, wish, out):
-    """One tick along a path: the wanted speeds into `wish`, the safe ones into `out`; both statuses.
+    """Do one safe tick along a path.
 
     Args:
-        work: arm and controller, see `workspace`.
+        work: arm, controller and pursuit, see `arm_arrays`.
         g: the arm among obstacles, see `robot_arrays`.
-        path: (n, 8).
+        path: (n, 8) poses of the tcp.
         q: (dof,) joints.
-        dt: seconds.
-        pursuit_state: (4,) of the pursuit.
-        wish: (dof,) result.
-        out: (dof,) result.
+        dt: duration of the tick [s].
+        pursuit_state: (4,) state of the pursuit, changed in place.
+        wish: (dof,) wanted joint speeds, a result.
+        out: (dof,) safe joint speeds, a result.
+
+    Returns:
+        (status of the pursuit, status of the safety layer).
     """
     status = pursue(work, path, q, dt, pursuit_state, wish)
     return status, safe_velocity(g, q, wish, dt, out)
@@ -44,19 +57,19 @@ def guarded_tick(work, g, path, q, dt, pursuit_state, wish, out):
 
 @kernel
 def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, first):
-    """Follow a path from q among obstacles that stand still; every step of the trace is proven clear.
+    """Follow a path among standing obstacles; every step of the trace is proven clear.
 
     Args:
-        work: see `guarded_tick`.
-        g: same.
-        path: same.
-        q: (dof,) joints, moved along.
-        dt: seconds.
-        pursuit_state: (4,) of the pursuit.
+        work: arm, controller and pursuit, see `arm_arrays`.
+        g: the arm among obstacles, see `robot_arrays`.
+        path: (n, 8) poses of the tcp.
+        q: (dof,) joints, changed in place to those at the end.
+        dt: duration of a tick [s].
+        pursuit_state: (4,) state of the pursuit, changed in place.
         wish: (dof,) scratch.
         out: (dof,) scratch.
-        trace: (t, dof) joints at every tick, written from row `first` on.
-        first: row.
+        trace: (t, dof) joints at every tick, a result.
+        first: first row of the trace to write.
 
     Returns:
         (status, row of the last entry, smallest joint margin [rad], ticks that the safety layer changed).
@@ -65,13 +78,13 @@ def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, firs
     for count in range(first, len(trace)):
         for i in range(len(q)):
             trace[count, i] = q[i]
-            margin = min(margin, q[i] - work[LIMITS, i], work[LIMITS + 1, i] - q[i])
+            margin = min(margin, q[i] - work[ARM.lower, i], work[ARM.upper, i] - q[i])
         status, safety = guarded_tick(work, g, path, q, dt, pursuit_state, wish, out)
         if status != FOLLOWING:
             return status, count, margin, changed
         if safety != FREE:
             changed += 1
         for i in range(len(q)):
-            # what stands still cannot hit an arm that does
+            # standing obstacles cannot hit a standing arm
             q[i] += dt * out[i] if safety != BLOCKED else 0.0
     return STALLED, len(trace) - 1, margin, changed

@@ -1,29 +1,48 @@
-"""A small quadratic program in a workspace: the nearest joint speeds that keep linear bounds.
+"""A small quadratic program in a packed array: the nearest joint speeds that satisfy linear bounds.
 
 Minimizes `(x - x0)^T W (x - x0) / 2 + sum s_i^2 / (2 SLACK)` under `a_i . x + s_i >= b_i`, where only soft rows have
 a slack `s_i`, by the dual active-set method of Goldfarb and Idnani (1983). It starts from x0 and adds one violated
 bound at a time, so it costs nothing where nothing is violated; the slack gives an answer also where the bounds
 contradict each other. Nothing is allocated.
-
-A row holds, from column 0 on: a (16), W^-1 a (16), b, softness (SLACK or 0), multiplier, 1 if active.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ..jit import inner, kernel
 
 SLACK = 1e-7
-"""Softness of a soft row: a multiplier of 1 gives way by this much."""
-IMAGE, BOUND, SOFTNESS, MULTIPLIER, ACTIVE, WIDTH = 16, 32, 33, 34, 35, 36
+"""Softness of a soft row: the slack per unit of its multiplier."""
 MOST_ACTIVE = 30
+"""Largest number of rows that are active at a time."""
 TOLERANCE = 1e-10
+"""Violation up to which a row counts as satisfied."""
+
+
+class BoundColumns(NamedTuple):
+    """Columns of a bound; its normal a (16) comes first, one column per coordinate."""
+
+    image: int = 16  # W^-1 a (16)
+    bound: int = 32  # b
+    softness: int = 33  # SLACK for a soft row, 0 for a hard one
+    multiplier: int = 34
+    active: int = 35  # 1 if the row is active
+    width: int = 36
+
+
+QP = BoundColumns()
 
 
 @kernel
 def inverse_weight(weight, n):
-    """Replace the positive definite n x n matrix in the first rows by its inverse (Cholesky, in place)."""
+    """Invert a positive definite matrix in place (Cholesky).
+
+    Args:
+        weight: the matrix in its first n rows and columns.
+        n: size of the matrix.
+    """
     for j in range(n):
         s = weight[j, j]
         for k in range(j):
@@ -55,24 +74,24 @@ def inverse_weight(weight, n):
 
 @inner
 def _images(rows, count, inverse, n):
-    """`W^-1 a` of every row; no row is active."""
+    """Compute `W^-1 a` of every row and reset the active set."""
     for k in range(count):
-        rows[k, MULTIPLIER] = 0.0
-        rows[k, ACTIVE] = 0.0
+        rows[k, QP.multiplier] = 0.0
+        rows[k, QP.active] = 0.0
         for i in range(n):
             s = 0.0
             for j in range(n):
                 s += inverse[i, j] * rows[k, j]
-            rows[k, IMAGE + i] = s
+            rows[k, QP.image + i] = s
 
 
 @inner
 def _most_violated(rows, count, x, n):
-    """The row that is violated most, relative to its length; -1 if none is."""
+    """Number of the row that is violated most, -1 if all are satisfied."""
     worst, most = -1, -TOLERANCE
     for k in range(count):
-        if rows[k, ACTIVE] == 0.0:
-            value = -rows[k, BOUND]
+        if rows[k, QP.active] == 0.0:
+            value = -rows[k, QP.bound]
             for i in range(n):
                 value += rows[k, i] * x[i]
             if value < most:
@@ -82,9 +101,16 @@ def _most_violated(rows, count, x, n):
 
 @kernel
 def all_hold(rows, count, x, n):
-    """True if x violates no row: then `solve` would leave it as it is, and needs no W for it."""
+    """Return True if x violates no row: then `solve` would not change x, so W is not needed.
+
+    Args:
+        rows: (>= count, >= QP.width) bounds.
+        count: number of rows.
+        x: (n,) point.
+        n: number of coordinates.
+    """
     for k in range(count):
-        value = -rows[k, BOUND]
+        value = -rows[k, QP.bound]
         for i in range(n):
             value += rows[k, i] * x[i]
         if value < -TOLERANCE:
@@ -95,17 +121,17 @@ def all_hold(rows, count, x, n):
 @inner
 def _inner(rows, i, j, n):
     """`a_i^T W^-1 a_j`, with the slack's share."""
-    s = rows[i, SOFTNESS] if i == j else 0.0
+    s = rows[i, QP.softness] if i == j else 0.0
     for k in range(n):
-        s += rows[i, k] * rows[j, IMAGE + k]
+        s += rows[i, k] * rows[j, QP.image + k]
     return s
 
 
 @inner
 def _directions(rows, p, active, size, low, n):
-    """Change r of the active multipliers per unit of row p's, into row MOST_ACTIVE of `low`; False if dependent.
+    """Write the change r of the active multipliers per unit of that of row p into `low[MOST_ACTIVE]`.
 
-    Solves `(N^T H N) r = N^T H a_p` by Cholesky.
+    Solves `(N^T H N) r = N^T H a_p` by Cholesky; returns False if row p depends on the active rows.
     """
     r = low[MOST_ACTIVE]
     for j in range(size):
@@ -135,9 +161,9 @@ def _directions(rows, p, active, size, low, n):
 
 @inner
 def _drop(rows, active, size, place):
-    """Take a row out of the active set; returns the new size."""
-    rows[int(active[place]), ACTIVE] = 0.0
-    rows[int(active[place]), MULTIPLIER] = 0.0
+    """Remove a row from the active set; returns the new size."""
+    rows[int(active[place]), QP.active] = 0.0
+    rows[int(active[place]), QP.multiplier] = 0.0
     for k in range(place, size - 1):
         active[k] = active[k + 1]
     return size - 1
@@ -145,25 +171,25 @@ def _drop(rows, active, size, place):
 
 @inner
 def _move(rows, x, p, active, size, r, t, n):
-    """Go the length t: multipliers and x; the row p takes part with its own multiplier."""
+    """Take a step of length t: update x and the multipliers, that of row p included."""
     for k in range(size):
-        rows[int(active[k]), MULTIPLIER] -= t * r[k]
-    rows[p, MULTIPLIER] += t
+        rows[int(active[k]), QP.multiplier] -= t * r[k]
+    rows[p, QP.multiplier] += t
     for i in range(n):
-        z = rows[p, IMAGE + i]
+        z = rows[p, QP.image + i]
         for k in range(size):
-            z -= r[k] * rows[int(active[k]), IMAGE + i]
+            z -= r[k] * rows[int(active[k]), QP.image + i]
         x[i] += t * z
 
 
 @inner
 def _add(rows, x, p, active, size, low, n):
-    """Make row p hold, dropping active rows that stand in the way; the new size, or -1 if it cannot hold."""
+    """Satisfy row p, dropping active rows that block it; returns the new size, or -1 if the row is infeasible."""
     r = low[MOST_ACTIVE]
     for _ in range(4 * MOST_ACTIVE):
         if size == MOST_ACTIVE or not _directions(rows, p, active, size, low, n):
             return -1
-        value, gain = rows[p, SOFTNESS] * rows[p, MULTIPLIER] - rows[p, BOUND], _inner(rows, p, p, n)
+        value, gain = rows[p, QP.softness] * rows[p, QP.multiplier] - rows[p, QP.bound], _inner(rows, p, p, n)
         for i in range(n):
             value += rows[p, i] * x[i]
         for k in range(size):
@@ -171,15 +197,15 @@ def _add(rows, x, p, active, size, low, n):
         full = -value / gain if gain > 1e-13 else math.inf
         part, place = math.inf, -1
         for k in range(size):
-            if r[k] > 0.0 and rows[int(active[k]), MULTIPLIER] / r[k] < part:
-                part, place = rows[int(active[k]), MULTIPLIER] / r[k], k
+            if r[k] > 0.0 and rows[int(active[k]), QP.multiplier] / r[k] < part:
+                part, place = rows[int(active[k]), QP.multiplier] / r[k], k
         t = min(full, part)
         if t == math.inf:
             return -1
         _move(rows, x, p, active, size, r, t, n)
         if full <= part:
             active[size] = p
-            rows[p, ACTIVE] = 1.0
+            rows[p, QP.active] = 1.0
             return size + 1
         size = _drop(rows, active, size, place)
     return -1
@@ -187,12 +213,12 @@ def _add(rows, x, p, active, size, low, n):
 
 @kernel
 def solve(x, inverse, rows, count, active, low, n):
-    """Move x, which holds x0, to the solution; False if a hard bound could not be met.
+    """Move x from x0 to the solution; returns False if a hard bound is infeasible.
 
     Args:
         x: (n,) x0 on entry, the solution on exit.
         inverse: W^-1 in its first n rows and columns.
-        rows: bounds, see the module.
+        rows: (>= count, >= QP.width) bounds, see QP.
         count: number of rows.
         active: (MOST_ACTIVE,) scratch.
         low: (MOST_ACTIVE + 1, MOST_ACTIVE) scratch.

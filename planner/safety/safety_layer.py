@@ -1,9 +1,9 @@
-"""The safety layer: any command in, a command out that keeps the distance to what is known.
+"""The safety layer: it turns any command into one that keeps the margins to all known obstacles.
 
-First the nearest joint speeds that keep the bounds of `barrier`. Then the guard: a step is taken only if it surely
-stays clear, also between its ends; else half of it, a quarter and so on, at last none. For obstacles that stand still
-and exact kinematics this is a guarantee, whatever the command (method reference section 7). Where something comes
-faster than the arm can retreat, it does the best it can and says BLOCKED.
+First come the nearest joint speeds that satisfy the bounds of `barrier`. Then the guard: a step is taken only if it
+surely stays clear, also between its ends; else half of it, a quarter and so on, in the end no step at all. For
+standing obstacles and exact kinematics this is a guarantee, whatever the command (method reference section 7). If an
+obstacle approaches faster than the arm can retreat, the layer sends the best command there is and reports BLOCKED.
 """
 
 from __future__ import annotations
@@ -16,45 +16,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..collision.clearance import (
-    find_near,
-    min_slack,
-    near_pair_slack,
-    placed_step_stays_clear,
-    reach_of,
-    step_stays_clear,
-)
-from ..collision.robot_arrays import (
-    HEADER,
-    LEVERS,
-    N_NEAR,
-    NEXT,
-    PREVIOUS,
-    SEEN,
-    SEEN_COUNTS,
-    SEEN_MOVING,
-    SEEN_ROOM,
-    SETTINGS,
-    STEP,
-    WISH,
-    WORLD,
-    place_capsules,
-    robot_arrays,
-)
+from ..collision.capsule_placement import place_capsules
+from ..collision.clearance import find_near, min_slack
+from ..collision.robot_arrays import HEADER, LAST_LOOK, ROW, SETTING, robot_arrays
+from ..collision.step_certificates import near_pair_slack, placed_step_stays_clear, reach_of, step_stays_clear
+from ..columns import packed_row
 from ..errors import BadOption, BadShape, UnknownName
 from ..geometry.shapes import Obstacle, pack
 from ..jit import inner, kernel
+from ..ranges import check_ranges
 from ..robot.arm import Arm
 from ..robot.body import Body
-from .barrier import DECAY, HALVINGS, SHELL, clip_to_limits, constrain, exceeds_limits, scale_to_speeds
+from .barrier import clip_to_limits, constrain, exceeds_limits, scale_to_speeds
 
 FREE, CHANGED, HELD, BLOCKED = 0, 1, 2, 3
-"""The command is as it was; it was changed; it was shortened by the guard; what must hold cannot hold.
+"""Status of a command: unchanged; changed by the bounds; shortened by the guard; the constraints are infeasible.
 
-BLOCKED says to the caller: the command is the best there is, but no promise of distance goes with it. Among obstacles
-that stand still it comes too where a cornered robot has less room than the buffer (0.8 % of adversarial steps): the
-bounds ask for a retreat that there is none of, the guard's step, mostly none at all, is still proven clear, and to go
-on commanding is safe. Where something moves, it comes closer than it may: stop what brings it, if you can.
+BLOCKED means that the command is the best there is, without a guaranteed distance. Among standing obstacles a cornered
+robot with less slack than the buffer gets it too (0.8 % of adversarial steps): the bounds ask for a retreat that does
+not exist; the guard's step, mostly none at all, is still proven clear, so to continue is safe. If an obstacle moves, it
+comes within its margin: stop whatever moves it, if you can.
 """
 
 
@@ -63,20 +44,20 @@ class SafetySettings:
     """Distances and rates of the safety layer.
 
     Attributes:
-        distance: to keep between body and obstacles [m], where an obstacle has no margin of its own. The measured
-            tracking error of the arm belongs in it.
-        self_distance: to keep between parts of the robot [m].
-        shell: distance [m] below which a pair is looked at.
-        alpha: approach is at most this times the room that is left [1/s].
-        buffer: room [m] that the bounds leave over, so that motion along a surface is not stopped by rounding.
-        decay: the guard takes a step only if it leaves at least 1 - decay of the room.
-        halvings: how often the guard halves a step before it takes none.
-        limit_gain: approach to a joint limit is at most this times the distance to it [1/s].
-        rotation_weight: of the tools' turning against their moving, in what "nearest speeds" means [m^2].
-        rest_weight: of a joint's own motion [m^2].
+        distance: margin [m] between body and obstacles, for obstacles without a margin of their own. It includes
+            the measured tracking error of the arm.
+        self_distance: margin [m] between parts of the robot.
+        shell: distance [m] below which a pair is near and gets a bound.
+        alpha: largest approach per slack [1/s].
+        buffer: slack [m] that the bounds leave, so that rounding does not stop a motion along a surface.
+        decay: the guard takes a step only if it leaves at least 1 - decay of the slack.
+        halvings: number of times the guard halves a step before it takes none.
+        limit_gain: largest approach to a joint limit per distance to the limit [1/s].
+        rotation_weight: weight of the tools' rotation against their translation in the metric of speeds [m^2].
+        rest_weight: weight of every joint's own motion [m^2].
         acceleration: largest change of a joint's speed [rad/s^2] that the bounds ask for, for arms that are not
-            ideal; stopping in the guard is not bound by it.
-        lead: seconds that moving obstacles are looked at ahead of time, for arms that lag.
+            ideal; a stop by the guard is exempt.
+        lead: time [s] by which moving obstacles are predicted, for arms that lag.
     """
 
     distance: float = 0.01
@@ -93,53 +74,58 @@ class SafetySettings:
     lead: float = 0.0
 
     def __post_init__(self):
-        for name in ("alpha", "shell", "limit_gain", "rotation_weight", "rest_weight", "acceleration"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise BadOption(name, f"{getattr(self, name)} is not a positive number")
-        for name in ("distance", "self_distance", "buffer", "lead"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise BadOption(name, f"{getattr(self, name)} is not a number >= 0")
-        if not 0 < self.decay <= 1:
-            raise BadOption("decay", f"{self.decay} is not in (0, 1]")
-        if not 1 <= self.halvings <= 30:
-            raise BadOption("halvings", f"{self.halvings} is not from 1 to 30")
+        check_ranges(self, "(0, inf)", "alpha", "shell", "limit_gain", "rotation_weight", "rest_weight", "acceleration")
+        check_ranges(self, "[0, inf)", "distance", "self_distance", "buffer", "lead")
+        check_ranges(self, "(0, 1]", "decay")
+        check_ranges(self, "[1, 30]", "halvings")
         if self.shell <= max(self.distance, self.self_distance):
             raise BadOption("shell", f"{self.shell} is not above the distance to keep, {self.distance}")
 
-    def packed(self, dt: float) -> tuple[float, ...]:
-        """The settings as the kernels take them, for commands that are held for dt seconds."""
-        limit_gain = min(self.limit_gain, 1.0 / dt)  # no farther than to the limit in one step
-        rates = (self.shell, self.alpha, self.buffer, limit_gain, self.rotation_weight, self.rest_weight)
-        return (*rates, self.decay, float(self.halvings), self.acceleration * dt, 0.0, self.self_distance)
+    def packed(self, dt: float) -> np.ndarray:
+        """Return the settings as the kernels take them (see `robot_arrays.SETTING`), for commands held for dt [s]."""
+        return packed_row(
+            SETTING,
+            shell=self.shell,
+            alpha=self.alpha,
+            buffer=self.buffer,
+            limit_gain=min(self.limit_gain, 1.0 / dt),  # no farther than to the limit in one step
+            rotation_weight=self.rotation_weight,
+            rest_weight=self.rest_weight,
+            decay=self.decay,
+            halvings=self.halvings,
+            slew=self.acceleration * dt,
+            self_margin=self.self_distance,
+        )
 
 
 @inner
 def _backtracked(g, q, x, dt):
-    """Shorten the speeds x (n,) until a step of dt seconds from q (n,) surely stays clear; the status.
+    """Shorten the speeds x (n,) until a step of dt seconds from q (n,) surely stays clear; returns the status.
 
-    Where none does, the one of all that leaves most room is taken. Near pairs as found at q, capsules at WORLD.
+    If no length does, the one that leaves most slack is taken. The near pairs were found at q, and the capsules
+    placed at ROW.placed.
     """
-    n, step, halvings = len(q), g[STEP], int(g[SETTINGS, HALVINGS])
+    n, step, halvings = len(q), g[ROW.step], int(g[ROW.settings, SETTING.halvings])
     for i in range(n):
         step[i] = x[i] * dt
     reach = reach_of(g, step, dt)
-    if reach > g[SETTINGS, SHELL]:
+    if reach > g[ROW.settings, SETTING.shell]:
         find_near(g, reach)
-    if int(g[HEADER, N_NEAR]) == 0:
+    if int(g[ROW.header, HEADER.near]) == 0:
         return FREE
-    slack, scale, best, best_room = near_pair_slack(g, -1, 0.0), 1.0, 0.0, -math.inf
+    slack, scale, best, best_slack = near_pair_slack(g, -1, 0.0), 1.0, 0.0, -math.inf
     for k in range(halvings + 1):
         if k == halvings:
             scale = 0.0
         for i in range(n):
             step[i] = scale * x[i] * dt
-            g[WISH, i] = q[i] + step[i]
-        place_capsules(g, g[WISH, :n], NEXT)
-        after = near_pair_slack(g, NEXT, dt)
-        if after > best_room:
-            best, best_room = scale, after
-        gentle = slack <= 0.0 or after >= (1.0 - g[SETTINGS, DECAY]) * slack
-        # the whole step is placed already, its ways are bound: mostly there is no need to look at parts of it
+            g[ROW.stepped, i] = q[i] + step[i]
+        place_capsules(g, g[ROW.stepped, :n], ROW.placed_next)
+        after = near_pair_slack(g, ROW.placed_next, dt)
+        if after > best_slack:
+            best, best_slack = scale, after
+        gentle = slack <= 0.0 or after >= (1.0 - g[ROW.settings, SETTING.decay]) * slack
+        # the whole step is placed and its displacements are bounded: mostly its parts need no check
         whole = k == 0 and placed_step_stays_clear(g, step[:n], 0.0, dt)
         if gentle and (whole or step_stays_clear(g, q, step[:n], dt)):
             for i in range(n):
@@ -153,38 +139,42 @@ def _backtracked(g, q, x, dt):
 
 @inner
 def _all_far(g, q, x, dt):
-    """True if at the last look everything was so far that nothing can be close now, nor during this step."""
-    if g[SEEN, SEEN_COUNTS] == 0.0 or g[SEEN, SEEN_MOVING] == 1.0:
+    """True if at the last look all pairs were so far that none can be near now or during this step."""
+    if g[ROW.last_look, LAST_LOOK.valid] == 0.0 or g[ROW.last_look, LAST_LOOK.moving] == 1.0:
         return False
     displacement = 0.0
     for i in range(len(q)):
-        displacement += g[LEVERS, i] * (abs(q[i] - g[SEEN, i]) + abs(x[i]) * dt)
-    # two parts of the robot may both move
-    return g[SEEN, SEEN_ROOM] - 2.0 * displacement > g[SETTINGS, SHELL]
+        displacement += g[ROW.levers, i] * (abs(q[i] - g[ROW.last_look, i]) + abs(x[i]) * dt)
+    # both capsules of a pair may move
+    return g[ROW.last_look, LAST_LOOK.slack] - 2.0 * displacement > g[ROW.settings, SETTING.shell]
 
 
 @inner
 def _look(g, q):
-    """Find the near pairs at q; where there are none, remember how far everything is."""
-    place_capsules(g, q, WORLD)
-    find_near(g, g[SETTINGS, SHELL])
-    g[SEEN, SEEN_COUNTS] = 0.0
-    if int(g[HEADER, N_NEAR]) == 0:
-        g[SEEN, SEEN_ROOM], g[SEEN, SEEN_COUNTS] = min_slack(g, WORLD, 0.0, 1.0), 1.0
+    """Find the near pairs at q; if there are none, remember the slack of all pairs."""
+    place_capsules(g, q, ROW.placed)
+    find_near(g, g[ROW.settings, SETTING.shell])
+    g[ROW.last_look, LAST_LOOK.valid] = 0.0
+    if int(g[ROW.header, HEADER.near]) == 0:
+        g[ROW.last_look, LAST_LOOK.slack] = min_slack(g, ROW.placed, 0.0, 1.0)
+        g[ROW.last_look, LAST_LOOK.valid] = 1.0
         for i in range(len(q)):
-            g[SEEN, i] = q[i]
+            g[ROW.last_look, i] = q[i]
 
 
 @kernel
 def safe_velocity(g, q, qdot, dt, out):
-    """Joint speeds near the wanted ones that keep clear; the status (FREE, CHANGED, HELD or BLOCKED).
+    """Compute joint speeds near the wanted ones that keep clear.
 
     Args:
-        g: see `robot_arrays`.
+        g: array of the robot, see `robot_arrays`.
         q: (n,) joints of all arms.
         qdot: (n,) wanted speeds, any numbers whatever.
-        dt: seconds that they will be held.
+        dt: time for which the speeds will be held [s].
         out: (n,) result.
+
+    Returns:
+        The status: FREE, CHANGED, HELD or BLOCKED.
     """
     n = len(q)
     for i in range(n):
@@ -192,33 +182,33 @@ def safe_velocity(g, q, qdot, dt, out):
     scale_to_speeds(g, out)
     missed, far = False, _all_far(g, q, out, dt)
     if far:
-        g[HEADER, N_NEAR] = 0
+        g[ROW.header, HEADER.near] = 0
     else:
         _look(g, q)
-    if int(g[HEADER, N_NEAR]) > 0 or exceeds_limits(g, q, out):
+    if int(g[ROW.header, HEADER.near]) > 0 or exceeds_limits(g, q, out):
         missed = constrain(g, q, out)
     clip_to_limits(g, q, out)
     status = FREE
     for i in range(n):
         if out[i] != qdot[i]:
             status = CHANGED
-    # bounds change speeds by no more than the slew, and only where something is near or a limit is
+    # the bounds change speeds by at most the slew, and only near an obstacle or a limit
     if not (far and _all_far(g, q, out, dt)):
         if far:
             _look(g, q)
         status = max(status, _backtracked(g, q, out, dt))
     for i in range(n):
-        g[PREVIOUS, i] = out[i]
+        g[ROW.previous, i] = out[i]
     return BLOCKED if missed else status
 
 
 class Filtered(NamedTuple):
-    """A command after the safety layer.
+    """A command filtered by the safety layer.
 
     Attributes:
         velocity: (n,) joint speeds [rad/s or m/s].
         status: FREE, CHANGED, HELD or BLOCKED.
-        slack: smallest distance of a close pair less what it must keep, before the step [m]; inf if none is close.
+        slack: smallest slack [m] of the near pairs before the step; inf without any.
     """
 
     velocity: np.ndarray
@@ -227,7 +217,7 @@ class Filtered(NamedTuple):
 
     @property
     def blocked(self) -> bool:
-        """What must hold cannot hold: something comes faster than the robot can retreat."""
+        """True if the constraints are infeasible: an obstacle comes faster than the robot can retreat."""
         return self.status == BLOCKED
 
 
@@ -237,8 +227,8 @@ class SafetyLayer:
     Args:
         arms: the arms.
         bodies: their bodies, held objects included, in the same order.
-        obstacles: what is around; moving ones with their velocity.
-        dt: seconds that a command is held.
+        obstacles: all known obstacles; moving ones with their velocity.
+        dt: time for which a command is held [s].
         settings: see `SafetySettings`.
         allowed: pairs of names (of a body's capsule or held object, of an obstacle) that may touch.
         pairs: capsules, counted through all bodies, that may hit each other; see `body_pairs`.
@@ -257,8 +247,7 @@ class SafetyLayer:
     ):
         self.settings, self.dt = settings or SafetySettings(), float(dt)
         self.joints = sum(arm.dof for arm in arms)
-        if not 0 < self.dt < math.inf:
-            raise BadOption("dt", f"{dt} is not a positive number of seconds")
+        check_ranges(self, "(0, inf)", "dt")
         seen = [obstacle.at(self.settings.lead) for obstacle in obstacles]
         self.work = robot_arrays(
             arms,
@@ -271,11 +260,15 @@ class SafetyLayer:
         )
 
     def __call__(self, q: ArrayLike, velocity: ArrayLike) -> Filtered:
-        """A safe command near the wanted one.
+        """Return a safe command near the wanted one.
 
         Args:
             q: (n,) joints now, arm after arm.
-            velocity: (n,) wanted joint speeds; not finite ones count as 0.
+            velocity: (n,) wanted joint speeds [rad/s or m/s]; speeds that are not finite count as 0.
+
+        Raises:
+            BadShape: a wrong number of joints.
+            BadOption: joints that are not finite.
         """
         joints, wanted = self._checked("q", q), self._checked("velocity", velocity)
         if not np.isfinite(joints).all():
@@ -292,12 +285,12 @@ class SafetyLayer:
 
 
 def contact_masks(names: Sequence[str], obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]]) -> list[int]:
-    """Per obstacle the capsules, as bits of a number, that may touch it.
+    """Return for every obstacle the capsules that may touch it, as bits of a number.
 
     Args:
-        names: whose each capsule is.
+        names: names of the capsules, counted through all bodies.
         obstacles: the obstacles.
-        allowed: pairs of a name of a capsule and the name of an obstacle.
+        allowed: pairs of names (of a capsule, of an obstacle).
 
     Raises:
         UnknownName: no capsule or no obstacle has such a name.

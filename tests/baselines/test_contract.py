@@ -13,11 +13,12 @@ from onedemo.baselines.factory import POLICIES, make_policy
 from onedemo.baselines.policy import PolicyReport
 from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.envs.core.description import FAILURES
-from onedemo.planner.errors import BadConfig, BadOption, UnknownName
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.errors import BadOption, UnknownName
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 each_policy = pytest.mark.parametrize("name", installed(*sorted(POLICIES)))
 each_program = pytest.mark.parametrize("name", installed(*PROGRAMS, "residual"))
@@ -32,7 +33,7 @@ def env():
 
 
 def a_policy(env, name="screw", settings=None):
-    demonstration = load_demonstration(shipped_demonstration("stack"))
+    demonstration = read_demonstration(shipped_demonstration("stack"))
     if name in LEARNED:
         settings = {"checkpoint": saved_actor(env, name), **(settings or {})}
     return make_policy(name, env.unwrapped.task, demonstration, settings)

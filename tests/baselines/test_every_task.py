@@ -18,7 +18,7 @@ from onedemo.bench.task_table import TASKS
 from onedemo.configs.grid import load_config
 from onedemo.configs.run_config import RunConfig
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import key_poses, resampled
 
 TICKS = 100
@@ -35,7 +35,7 @@ def task_env(request):
 def taken_up(task_env, name, settings):
     """The report of a policy after two seconds: it has moved, each of its actions is one that the environment takes."""
     env, config = task_env
-    demonstration = load_demonstration(shipped_demonstration(config.demonstration))
+    demonstration = read_demonstration(shipped_demonstration(config.demonstration))
     policy, state = make_policy(name, env.unwrapped.task, demonstration, settings), None
     observation, _ = env.reset(seed=1000)
     before, moved = observation["joint_positions"].copy(), 0.0

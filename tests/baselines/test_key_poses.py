@@ -12,7 +12,7 @@ from onedemo.bench.geometric.metrics import curve_gap
 from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.errors import BadOption
 from onedemo.planner.geometry.pose import PosePath
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import key_poses, resampled
 from onedemo.planner.imitation.tsia import screw_path
 
@@ -22,7 +22,7 @@ each_join = pytest.mark.parametrize("join", [None, screw_path, straight_path], i
 
 
 def shown(name):
-    return load_demonstration(shipped_demonstration(name))
+    return read_demonstration(shipped_demonstration(name))
 
 
 @each_demonstration

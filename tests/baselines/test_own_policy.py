@@ -12,9 +12,10 @@ import pytest
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.bench.cli import main
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.errors import BadConfig, BadOption
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.errors import BadOption
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_policy.md"
 BROKEN = """
@@ -54,7 +55,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def made(env, name, settings=None):
-    demonstration = load_demonstration(shipped_demonstration("stack"))
+    demonstration = read_demonstration(shipped_demonstration("stack"))
     return make_policy(name, env.unwrapped.task, demonstration, settings)
 
 

@@ -13,7 +13,7 @@ from onedemo.bench.run.episode_jobs import made, policy_for
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.planner.errors import BadOption
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 each_task = pytest.mark.parametrize("task", ["reach", "place_one", "tilt_pour", "insert_one"])
 
@@ -55,6 +55,6 @@ def test_a_block_that_waits_on_the_table_is_fetched_first():
 
 def test_what_moves_joints_needs_a_task_that_is_moved_by_joints():
     env = gym.make("onedemo/Reach-v0")
-    demonstration = load_demonstration(shipped_demonstration("stack"))
+    demonstration = read_demonstration(shipped_demonstration("stack"))
     with pytest.raises(BadOption, match=r"'control_mode': 'ee_twist'.*control_mode='joint_velocity'"):
         make_policy("screw", env.unwrapped.task, demonstration)

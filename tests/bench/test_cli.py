@@ -20,7 +20,7 @@ from onedemo.bench.perf import command as perf
 from onedemo.bench.perf.tasks import step_line
 from onedemo.bench.task_table import TASKS
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.imitation.demonstration_files import load_demonstration, save_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration, save_demonstration
 
 ENTRY = "import sys; from onedemo.bench.cli import main; main()"
 
@@ -65,7 +65,7 @@ def test_a_demonstration_is_summed_up_for_a_reader(monkeypatch, capsys):
 
 
 def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_path):
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     save_demonstration(dataclasses.replace(demo, name="[/red] [bold]x", licence="[link=x]y"), tmp_path / "odd.npz")
     code, out, _ = called(monkeypatch, capsys, "demo", "check", tmp_path / "odd.npz")
     assert code == 0
@@ -170,7 +170,7 @@ def test_a_mistake_in_a_file_names_the_file_and_one_on_the_command_line_does_not
     ],
 )
 def test_a_demonstration_of_something_else_is_refused_by_file_and_key(changes, message, monkeypatch, capsys, tmp_path):
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     if changes.get("segments"):
         changes = {"segments": demo.segments[:1]}
     save_demonstration(dataclasses.replace(demo, **changes), tmp_path / "other.npz")

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onedemo.configs.dotted_keys import MISSING, at, having, leaves, merged, without
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.grid import load_config, load_grid
 from onedemo.configs.run_config import CELL_KEYS, RUN_KEYS, RunConfig, json_schema
 from onedemo.configs.shipped_files import FOLDER
-from onedemo.planner.errors import BadConfig
 
 BASE = "name: x\ntask: stack\ndemonstration: stack\n"
 TASKS = """

@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.plan_scene import load_scene, shipped_scene
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.errors import BadConfig, UnknownName
+from onedemo.planner.errors import UnknownName
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 DEMO = "demonstration: [[0, 0, 1, 0, 1, 0, 0], [0, 0.1, 1, 0, 1, 0, 0]]\n"
 GOAL = "goal: [0, 0.2, 1, 0, 1, 0, 0]\n"
@@ -205,7 +206,7 @@ def test_demonstrations_come_in_small_steps_and_keep_their_ends(tmp_path):
     assert np.diff(path.lengths()).max() <= 0.005 + 1e-9
     assert path.positions[[0, -1]] == pytest.approx(np.array([[0, 0, 1], [0, 0.1, 1]]))
     (tmp_path / "r.yaml").write_text(GOAL + "demonstration: {file: stack, segment: transfer}\n")
-    shown = load_demonstration(shipped_demonstration("stack")).segment_path("transfer")
+    shown = read_demonstration(shipped_demonstration("stack")).segment_path("transfer")
     recorded = load_scene(tmp_path / "r.yaml").demonstrated
     assert recorded[0].distance_to(shown[0]) == pytest.approx((0, 0), abs=1e-9)
     assert recorded[-1].distance_to(shown[-1]) == pytest.approx((0, 0), abs=1e-9)

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import pytest
 
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.grid import RunConfig, load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.configs.strict_yaml import load_mapping, parse, with_overrides
-from onedemo.planner.errors import BadConfig, UnknownName
+from onedemo.planner.errors import UnknownName
 
 GOOD = "name: mine\ntask: stack\ndemonstration: stack\n"
 BOMB = "a: &a [x, x]\n" + "".join(

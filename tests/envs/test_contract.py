@@ -17,7 +17,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import onedemo.envs
-from onedemo.planner.errors import BadAction, OneDemoError, RenderingUnavailable
+from onedemo.envs.errors import BadAction, RenderingUnavailable
+from onedemo.planner.errors import OneDemoError
 
 ALL = sorted(onedemo.envs.IDS)
 CASES = [(name, {}) for name in ALL] + [

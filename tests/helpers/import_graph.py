@@ -30,6 +30,7 @@ def tree_of(path: Path) -> ast.Module:
 def base_of(path: Path, node: ast.ImportFrom) -> str:
     """Dotted name of what a relative import imports from; "" for the root of the project."""
     package = path.relative_to(ROOT).parts[:-1]
+    package = () if package == ("face",) else package  # it is installed as the root
     return ".".join([*package[: len(package) - node.level + 1], *(node.module.split(".") if node.module else [])])
 
 
@@ -46,9 +47,10 @@ def imports_of(path: Path) -> frozenset[str]:
 
 def target_of(base: str, name: str) -> str:
     """The module that gives a name: a sub-module, the module that a face takes it from, or the module itself."""
-    if f"{base}.{name}".lstrip(".") in MODULES:
-        return f"{base}.{name}".lstrip(".")
-    path = MODULES[base]
+    module = f"{base}.{name}" if base else name if name in MODULES else f"face.{name}"
+    if module in MODULES:
+        return module
+    path = MODULES[base or "face"]
     if path.name == "__init__.py":
         for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ImportFrom) and name in [alias.name for alias in node.names]:

@@ -21,12 +21,13 @@ from helpers.solids import fcl_distance, fcl_obstacle, random_shape
 from helpers.strategies import random_dq
 
 from onedemo.configs.shipped_files import shipped_demonstration
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Obstacle, Shape
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import resampled, trimmed
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import Certificate, certify
@@ -37,7 +38,7 @@ from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.settings import PlanSettings
 from onedemo.planner.robot.arm import Arm
-from onedemo.planner.robot.body import FRAME, A, Body
+from onedemo.planner.robot.body import BODY, Body
 from onedemo.planner.robot.chain_readers import turn_z_to
 
 KINDS = ("convex", "clutter", "gap", "trap", "shelf", "held", "cage")
@@ -74,14 +75,14 @@ class Problem(NamedTuple):
 @cache
 def panda() -> tuple[Arm, Body, np.ndarray]:
     """The Panda as it stands at the table: arm, capsules, usual joints."""
-    scene = compiled_scene("Panda")
-    return scene.arms[0].arm, robot_body("Panda"), scene.home[0]
+    scene = compiled_scene(ROBOTS["Panda"])
+    return scene.arms[0].arm, robot_body(ROBOTS["Panda"]), scene.home[0]
 
 
 @cache
 def demonstrated() -> PosePath:
     """The shipped transfer of a cube, in steps of 5 mm."""
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     return resampled(trimmed(demo.segment_path("transfer"), 0.02), 0.005)
 
 
@@ -185,7 +186,7 @@ def problem(kind: str, seed: int) -> Problem:
 
 def base_gap(body: Body, obstacles) -> float:
     """Distance [m] of the parts that no joint moves; `PlanningScene.slack` leaves them out."""
-    return tool_gap(body.rows[body.rows[:, FRAME] < 0][:, A:], obstacles, Pose.identity())
+    return tool_gap(body.rows[body.rows[:, BODY.frame] < 0][:, BODY.a :], obstacles, Pose.identity())
 
 
 def clear_posture(arm, scene, goal, start, rng, tries: int = 12) -> np.ndarray | None:

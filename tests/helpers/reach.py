@@ -11,6 +11,7 @@ import numpy as np
 
 from onedemo.baselines.programs.dual_arm_executor import WRIST
 from onedemo.configs.shipped_files import shipped_demonstration
+from onedemo.envs import ROBOTS
 from onedemo.envs.core.description import TaskFurniture
 from onedemo.envs.pour import layout as pour_layouts
 from onedemo.envs.pour.geometry import BACK, GLASSES, STANDS, TARGET, TILTED, UP, grasp, pouring
@@ -28,7 +29,7 @@ from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Obstacle, pack
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import resampled
 from onedemo.planner.imitation.tsia import final_path, guide_index, imitated_path
 from onedemo.planner.robot.body import Body
@@ -61,9 +62,9 @@ class Reach:
     """A robot at the table, with what stands there for ever."""
 
     def __init__(self, robot: str):
-        scene = compiled_scene(robot)
+        scene = compiled_scene(ROBOTS[robot])
         self.arm, self.home = scene.arms[0].arm, scene.home[0]
-        self._parts = robot_parts(robot, scene)
+        self._parts = robot_parts(scene)
         self.body = self._parts.bodies[0]
         self._pairs = pairs_of((self.arm,), self._parts.bodies, apart=WRIST)
 
@@ -79,7 +80,7 @@ class Reach:
         settings = SafetySettings().packed(0.02)
         return robot_arrays((self.arm,), (body,), pack(solids), masks=masks, pairs=self._pairs, settings=settings)
 
-    def room(self, work: np.ndarray, q: np.ndarray) -> float:
+    def slack(self, work: np.ndarray, q: np.ndarray) -> float:
         """Smallest room [m] of the arm, also to itself."""
         return float(slack_at(work, q, 0.0, 1.0))
 
@@ -168,7 +169,7 @@ class ShelfReach(Reach):
 
     def __init__(self, robot: str):
         super().__init__(robot)
-        shown = load_demonstration(shipped_demonstration("shelve"))
+        shown = read_demonstration(shipped_demonstration("shelve"))
         names = ("reach", "lift", "carry", "insert", "retreat")
         self.parts = {name: resampled(shown.segment_path(name), STEP) for name in names}
         self.grasp = shown.segment("reach").reference_pose.inverse() @ self.parts["reach"][-1]

@@ -21,10 +21,11 @@ from helpers.actors import random_actor, random_network
 from safetensors.numpy import save
 
 import onedemo.envs  # noqa: F401  (registers the ids)
+from onedemo.baselines.errors import BadActor
 from onedemo.baselines.learning.actor import Actor
 from onedemo.baselines.learning.actor_files import MAX_BYTES, load_actor, save_actor
 from onedemo.baselines.learning.network import Network
-from onedemo.planner.errors import BadActor, BadOption, BadShape, NotFinite
+from onedemo.planner.errors import BadOption, BadShape, NotFinite
 
 ODD = [None, True, -1, 0, 1.5, 1e308, 2**70, "", "a\nb\x1b[31m", "x" * 5000, [], {}, [[]], [None], {"": {}}]
 """What a value in the .json is replaced by."""

@@ -17,13 +17,13 @@ from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.envs.simulation.twist_control import MAX_ANGULAR, MAX_LINEAR
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.geometry.pose import Pose
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 MODES = ("ee_twist", "joint_velocity")
 
 
 def shown(name):
-    return load_demonstration(shipped_demonstration(name))
+    return read_demonstration(shipped_demonstration(name))
 
 
 def replayed(env, transitions, seed=0):

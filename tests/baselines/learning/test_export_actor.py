@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 import onedemo.envs  # noqa: F401  (registers the ids)
+from onedemo.baselines.errors import BadActor
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.learning.actor_files import load_actor, save_actor
 from onedemo.baselines.learning.export_actor import actor_of, network_of
 from onedemo.baselines.learning.feature_scaling import FlatFeatures, measured_normalization
 from onedemo.baselines.learning.features import Features
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.errors import BadActor, BadOption
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.errors import BadOption
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 library = pytest.importorskip("stable_baselines3", reason="needs the extra rl: stable-baselines3 and torch")
 torch = pytest.importorskip("torch", reason="needs the extra rl: stable-baselines3 and torch")
@@ -68,7 +69,7 @@ def test_the_policy_acts_as_the_model_does_in_the_environment(env, flat, kind, t
     method, task = kind.lower(), env.unwrapped.task
     actor = actor_of(model, task, method=method, features=flat.features, normalization=flat.normalization)
     assert actor.training.algorithm == kind and actor.training.steps >= 12
-    demonstration = load_demonstration(shipped_demonstration("stack"))
+    demonstration = read_demonstration(shipped_demonstration("stack"))
     policy = make_policy(method, task, demonstration, {"checkpoint": str(save_actor(actor, tmp_path / "trained"))})
     observation, _ = env.reset(seed=1)
     for _ in range(20):

@@ -13,17 +13,19 @@ from helpers.policies import LEARNED
 
 import onedemo.configs
 import onedemo.envs
+from onedemo.baselines.errors import BadActor
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.learning.actor_card import METHOD
 from onedemo.baselines.learning.actor_files import load_actor, save_actor
 from onedemo.baselines.learning.feature_scaling import FlatFeatures
 from onedemo.baselines.learning.learned_policy import METHODS
 from onedemo.baselines.learning.residual_policy import AroundScrew, corrected, default_scale
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.errors import BadActor, BadConfig, BadOption
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.errors import BadOption
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
-DEMONSTRATION = load_demonstration(shipped_demonstration("stack"))
+DEMONSTRATION = read_demonstration(shipped_demonstration("stack"))
 SHIPPED = sorted((Path(onedemo.configs.__file__).parent / "actors").glob("*.json"))
 JOINTS = {"control_mode": "joint_velocity"}
 

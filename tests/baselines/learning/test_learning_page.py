@@ -15,7 +15,7 @@ import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.learning.actor_card import KEYS
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 PAGE = (Path(__file__).parents[3] / "docs" / "learning.md").read_text(encoding="utf-8")
 CODE = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -35,7 +35,7 @@ def test_the_example_trains_an_actor_that_acts(tmp_path, monkeypatch):
     exec(compile(code, "learning.md", "exec"), {})
     env = gym.make(ID)
     settings = {"checkpoint": str(tmp_path / "my_actor.json")}
-    policy = make_policy("sac", env.unwrapped.task, load_demonstration(shipped_demonstration("stack")), settings)
+    policy = make_policy("sac", env.unwrapped.task, read_demonstration(shipped_demonstration("stack")), settings)
     observation, _ = env.reset(seed=0)
     action, _ = policy.predict(observation)
     assert env.action_space.contains(action)

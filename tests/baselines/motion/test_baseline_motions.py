@@ -8,11 +8,13 @@ from helpers.policies import PROGRAMS, installed
 from helpers.random_scenes import at, demonstrated, judged, panda, problem
 
 from onedemo.baselines import extras
+from onedemo.baselines.errors import MissingExtra
 from onedemo.baselines.factory import settings_of
 from onedemo.baselines.motion.generated_plan import NO_PATH
 from onedemo.baselines.motion.tool_obstacles import ToolObstacles
 from onedemo.baselines.paths_only import PATH_MAKERS, made_path, motion_planner
-from onedemo.planner.errors import BadConfig, MissingExtra, PlanFailed, UnknownName
+from onedemo.configs.errors import BadConfig
+from onedemo.planner.errors import PlanFailed, UnknownName
 from onedemo.planner.escape.repet import clear_of, point_tool
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Obstacle, Sphere
@@ -188,14 +190,14 @@ def test_what_appears_changes_only_what_is_still_to_come(name):
     assert min(clear_of(pose, TOOL, [ahead]) for pose in led) > min(clear_of(p, TOOL, [ahead]) for p in made.path)
 
 
-def leg(name, obstacles=(), settings=None):
+def planned(name, obstacles=(), settings=None):
     arm, body, home = panda()
     return motion_planner(name, arm, body, settings).plan(demonstrated(), home, PLACE, obstacles)
 
 
 @pytest.mark.parametrize("name", installed(*PROGRAMS))
 def test_every_policy_plans_a_leg_that_its_arm_can_follow(name):
-    plan = leg(name)
+    plan = planned(name)
     arm, _, home = panda()
     assert plan.success, plan.why
     np.testing.assert_array_equal(plan.joints[0], home)
@@ -230,22 +232,20 @@ def test_the_sampler_gives_up_after_its_budget(name):
 
 def smallest_room(plan, ball) -> float:
     """Distance [m] of the whole arm from a ball on the way, less a millimeter for the ticks between."""
-    scene = PlanningScene(
-        SceneTemplate(plan.request.arm, plan.request.body, SafetySettings(distance=0.0), plan.dt), [ball], 0.0
-    )
+    scene = PlanningScene(SceneTemplate(plan.arm, plan.body, SafetySettings(distance=0.0), plan.dt), [ball], 0.0)
     return min(scene.slack(q) for q in plan.joints)
 
 
 @pytest.mark.parametrize("name", ["decoupled", "replay"])
 def test_a_guard_is_off_unless_it_is_asked_for(name):
     arm, _, _ = panda()
-    free = leg(name)
+    free = planned(name)
     ball = Obstacle(Sphere(0.05), at(arm.fk(free.joints[len(free.joints) // 2]).position), name="ball")
-    blind = leg(name, [ball])
+    blind = planned(name, [ball])
     assert blind.success and blind.changed == 0 and smallest_room(blind, ball) < 0.0
     if name == "replay":
         assert blind.imitated_share < 1.0
-    guarded = leg(name, [ball], {"guard": True})
+    guarded = planned(name, [ball], {"guard": True})
     if guarded.success:
         assert smallest_room(guarded, ball) > 0.0
     else:
@@ -282,7 +282,7 @@ def test_without_the_guard_the_method_still_leads_its_hand_round():
 
 def test_a_path_that_ends_before_the_goal_is_no_plan():
     ball = Obstacle(Sphere(0.06), PLACE, name="ball")
-    plan = leg("potential", [ball])
+    plan = planned("potential", [ball])
     if not plan.success:
         assert plan.reason in (NO_PATH, "ik_or_limit") and len(plan.joints) == 1
 
@@ -299,7 +299,7 @@ def test_a_missing_library_is_one_line_with_its_extra(name, extra, monkeypatch):
 
     monkeypatch.setattr(extras, "import_module", absent)
     with pytest.raises(MissingExtra, match=rf"^\w+ is needed \(No module.*\): pip install 'onedemo\[{extra}\]'$"):
-        leg(name)
+        planned(name)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from helpers.random_scenes import at, demonstrated, judged, panda, problem
 from onedemo.baselines.factory import make_policy, settings_of
 from onedemo.baselines.motion.tool_frame import ToolFrameMotion, seen_from
 from onedemo.bench.geometric.metrics import curve_gap
-from onedemo.planner.errors import BadConfig
+from onedemo.configs.errors import BadConfig
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.reactive.command import DONE
@@ -38,7 +38,7 @@ def way_of(plan) -> PosePath:
 def test_what_is_asked_and_answered_is_of_the_true_tcp(name):
     arm, body, home = panda()
     plan = planned(name, TOOL)
-    assert plan.success and plan.request.arm is arm and plan.request.body is body
+    assert plan.success and plan.arm is arm and plan.body is body
     np.testing.assert_array_equal(plan.joints[0], home)
     end = arm.fk(plan.joints[-1])
     assert end.distance_to(PLACE)[0] < 3e-3 and end.distance_to(PLACE)[1] < 0.02

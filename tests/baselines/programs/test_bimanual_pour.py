@@ -13,7 +13,7 @@ from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.collision.self_collision import pairs_of
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry.pose import PosePath
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.tsia import GUIDE_START, guide_index
 
 
@@ -26,7 +26,7 @@ def env():
 
 @pytest.fixture(scope="module")
 def policy(env):
-    return make_policy("screw", env.unwrapped.task, load_demonstration(shipped_demonstration("pour")))
+    return make_policy("screw", env.unwrapped.task, read_demonstration(shipped_demonstration("pour")))
 
 
 def begun(env, policy, seed, level):

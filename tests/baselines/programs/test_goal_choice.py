@@ -14,7 +14,6 @@ from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import certify
-from onedemo.planner.log.motion_log import MotionLog
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.settings import PlanSettings
 
@@ -33,13 +32,7 @@ def a_leg(obstacles=(), **changes):
 
 
 def assert_clear(choice):
-    plan = choice.plan
-    log = MotionLog(
-        arm=plan.request.arm, body=plan.request.body, obstacles=plan.request.obstacles, joints=plan.joints,
-        time=plan.dt * np.arange(len(plan.joints)), safety=SETTINGS.safety.distance, goal=plan.request.goal,
-        allowed=plan.request.allowed,
-    )  # fmt: skip
-    certificate = certify(log)
+    certificate = certify(choice.plan.log())
     assert certificate.ok, certificate.reasons
 
 
@@ -128,15 +121,15 @@ def test_leaving_is_as_shown_or_straight_up_where_that_cannot_be():
     arm, _, home = panda()
     start = arm.fk(home)
     aside = screw_path(start, at([0.2, 0.0, 0.0]) @ start, 0.005)
-    leg = a_leg(leaving=aside)
-    shown = departure_path(arm, SETTINGS, home, leg)
+    motion = a_leg(leaving=aside)
+    shown = departure_path(arm, SETTINGS, home, motion)
     assert shown is not None and departure_path(arm, SETTINGS, home, a_leg()) is None
     np.testing.assert_allclose(shown[-1].position - start.position, [0.09, 0.0, 0.0], atol=5e-3)
     wall = Obstacle(Box((0.02, 0.3, 0.1)), at(start.position + np.array([0.1, 0.0, -0.02])), name="wall")
-    up = departure_path(arm, SETTINGS, home, leg._replace(obstacles=(wall,)))
+    up = departure_path(arm, SETTINGS, home, motion._replace(obstacles=(wall,)))
     assert up is not None
     np.testing.assert_allclose(up[-1].position - start.position, [0.0, 0.0, 0.09], atol=1e-9)
-    choice = choose(arm, SETTINGS, home, leg)
+    choice = choose(arm, SETTINGS, home, motion)
     assert [exact for _, exact in choice.parts] == [False, True]
     np.testing.assert_array_equal(choice.parts[0][0].dqs, shown.dqs)
     np.testing.assert_array_equal(choice.tail.dqs, choice.parts[1][0].dqs)

@@ -21,13 +21,13 @@ from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.envs.pour.geometry import GLASSES, SOURCE, TARGET, level_hand, tcp_from_glass
 from onedemo.planner.errors import BadDemonstration
 from onedemo.planner.geometry.pose import Pose
-from onedemo.planner.imitation.demonstration_files import load_demonstration, save_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration, save_demonstration
 from onedemo.planner.imitation.import_recordings import from_pose_table
 
 RECORDING = Path(__file__).parents[4] / "shared" / "data" / "panda_kinesthetic_pouring.npy"
 needs_recording = pytest.mark.skipif(not RECORDING.exists(), reason="the recording is not shipped")
 CONFIG = load_config(shipped_config("pour"))
-SHOWN = load_demonstration(shipped_demonstration("pour"))
+SHOWN = read_demonstration(shipped_demonstration("pour"))
 
 
 @pytest.fixture(scope="module")

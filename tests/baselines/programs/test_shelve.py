@@ -13,10 +13,10 @@ from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 
 CONFIG = load_config(shipped_config("shelve"))
-SHOWN = load_demonstration(shipped_demonstration("shelve"))
+SHOWN = read_demonstration(shipped_demonstration("shelve"))
 
 
 def shelved(seed, level, **arguments):

@@ -14,8 +14,8 @@ from helpers.example_runs import small_run
 from onedemo.bench.curves.command import run_curves
 from onedemo.bench.method_table import look_of, other_look
 from onedemo.bench.train.evaluations import LEG, NUMBERS, Point
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.train_config import TrainConfig
-from onedemo.planner.errors import BadConfig
 
 EPISODES = 10
 

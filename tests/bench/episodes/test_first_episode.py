@@ -18,7 +18,7 @@ from onedemo.bench.episodes.failure_videos import record_video
 from onedemo.bench.episodes.first_episode import Film
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.configs.grid import RunConfig
-from onedemo.planner.errors import RenderingUnavailable
+from onedemo.envs.errors import RenderingUnavailable
 
 
 class Noise:

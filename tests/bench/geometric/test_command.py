@@ -18,8 +18,8 @@ from onedemo.bench.geometric.jobs import METHODS, GeometricJobs, frames_row, key
 from onedemo.bench.geometric.parts import KINDS, part_named, robot, tool_of
 from onedemo.bench.geometric.suite import FILE, LEVELS, GeometricSuite, cells, drawn, read_suite
 from onedemo.bench.geometric.tables import is_kept
+from onedemo.configs.errors import BadConfig
 from onedemo.envs.scene.body_clearance import tool_clearance
-from onedemo.planner.errors import BadConfig
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere, pack
 from onedemo.planner.imitation.segmentation import key_poses
@@ -187,11 +187,11 @@ def test_a_plate_between_two_poses_is_found():
     tool = np.array([[0.0, 0.0, -0.01, 0.0, 0.0, 0.01, 0.005]])
     path = PosePath.from_vectors([[-0.2, 0, 0, 1, 0, 0, 0], [0.2, 0, 0, 1, 0, 0, 0]])
     plate = Obstacle(Box((0.001, 0.1, 0.1)), Pose.from_position_quaternion([0.05, 0.0, 0.0]))
-    assert not ToolJudge(tool, [plate]).judged(path).clear
+    assert not ToolJudge(tool, [plate]).clearance_of(path).clear
     beside = Obstacle(Sphere(0.02), Pose.from_position_quaternion([0.0, 0.0356, 0.0]))
-    found = ToolJudge(tool, [beside]).judged(path)
+    found = ToolJudge(tool, [beside]).clearance_of(path)
     assert found.clear and found.least == pytest.approx(0.0106, abs=2e-3)
-    assert ToolJudge(tool, []).judged(path) == (True, FAR)
+    assert ToolJudge(tool, []).clearance_of(path) == (True, FAR)
 
 
 def test_a_turn_that_sweeps_into_something_is_found():
@@ -199,7 +199,7 @@ def test_a_turn_that_sweeps_into_something_is_found():
     half = [np.cos(0.75), 0.0, 0.0, np.sin(0.75)]
     path = PosePath.from_vectors([[0, 0, 0, 1, 0, 0, 0], [0, 0, 0, *half]])
     ball = Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.29 * np.cos(0.8), 0.29 * np.sin(0.8), 0.0]))
-    assert not ToolJudge(tool, [ball]).judged(path).clear
+    assert not ToolJudge(tool, [ball]).clearance_of(path).clear
 
 
 def test_a_line_that_is_none_is_passed_over(tmp_path):

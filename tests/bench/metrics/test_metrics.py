@@ -33,11 +33,11 @@ from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.envs.simulation.moving_obstacles import ScheduledObstacle
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Sphere
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import trimmed
 
 PHYSICS_DT = 0.002
-STACK = load_demonstration(shipped_demonstration("stack"))
+STACK = read_demonstration(shipped_demonstration("stack"))
 
 
 def made(n=100, objects=1, z=None, held=None, tilt=None):
@@ -298,7 +298,7 @@ def test_an_episode_is_recorded_with_its_metrics_and_trace(stack, tmp_path):
 def test_every_metric_is_explained():
     traced = made(z=np.linspace(0.9, 1.1, 100), held=np.ones(100, dtype=bool), objects=2)
     env = gym.make("onedemo/Pour-v0")
-    numbers = dict.fromkeys(key for facts in TASKS.values() for key in facts.judged.values())
+    numbers = dict.fromkeys(key for facts in TASKS.values() for key in facts.task_metrics.values())
     known = set()
     for task in TASKS:
         found = metrics_of(

@@ -13,12 +13,14 @@ from onedemo.bench.drawing.convex_view import DrawingView, back_to_front, best_v
 from onedemo.bench.drawing.solids import scale_ends
 from onedemo.bench.plan import command as plan_command
 from onedemo.bench.plan.command import NOT_FOUND, REFUSED, plan_in, run_plan, scene_path
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.plan_scene import load_scene, shipped_scene
-from onedemo.planner.errors import BadConfig, UnknownName
+from onedemo.planner.errors import UnknownName
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.log.motion_log import digest_of, read_log
+from onedemo.planner.planning import refine
 
 DETOURS = ("sphere", "wall_gap", "shelf", "clutter")
 FOUND = ("free", *DETOURS)
@@ -49,7 +51,7 @@ def test_shipped_scenes_are_solved_and_the_judge_agrees(name):
     result = planned(name)
     assert result.plan.reason == ""
     assert result.plan.seconds < 1.0
-    certificate = certify(result.log)
+    certificate = certify(result.plan.log())
     assert certificate.reasons == ()
     assert certificate.clearance >= result.settings.safety.distance
     assert certificate.position_error < 0.005
@@ -86,7 +88,7 @@ def test_the_lines_tell_what_was_found(capsys):
     assert run_plan("sphere", [], None, None, judged=False) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "more than must be kept, at the ticks" in lines[1]
-    spare = 1e3 * (certify(planned("sphere").log).clearance - planned("sphere").settings.safety.distance)
+    spare = 1e3 * (certify(planned("sphere").plan.log()).clearance - planned("sphere").settings.safety.distance)
     # a sample may be a little farther than the closest moment between samples
     assert spare - 0.1 < float(lines[1].split()[1]) < spare + 1.0
     assert lines[3].startswith("not judged")
@@ -108,9 +110,9 @@ def test_a_plan_is_refined_and_what_is_written_is_the_refined_one(smooth, timed,
     assert ("of the speed limits and up to 5 rad/s^2" in lines[2]) == timed
     assert lines[3].startswith("judged      sound")
     plain, log = planned("sphere"), read_log(files[1])
-    assert certify(log).ok and digest_of(log) != digest_of(plain.log)
-    result = plain.plan.smoothed() if smooth else plain.plan
-    result = result.timed() if timed else result
+    assert certify(log).ok and digest_of(log) != digest_of(plain.plan.log())
+    result = refine.smoothed(plain.plan) if smooth else plain.plan
+    result = refine.timed(result) if timed else result
     np.testing.assert_array_equal(log.joints, result.joints)
     assert f"takes {result.dt * (len(result.joints) - 1):.1f} s" in lines[0]
     assert files[0].exists()
@@ -120,7 +122,7 @@ def test_a_plan_that_does_not_stay_clear_is_none(monkeypatch, capsys, tmp_path):
     good = planned("sphere")
     wall = Obstacle(Box((0.01, 0.01, 0.01)), good.arm.fk(good.plan.joints[len(good.plan.joints) // 2]), name="nail")
     asked = good.plan.request._replace(obstacles=(wall,))
-    monkeypatch.setattr(plan_command, "plan_in", lambda scene: good._replace(plan=good.plan._replace(asked=asked)))
+    monkeypatch.setattr(plan_command, "plan_in", lambda scene: good._replace(plan=good.plan._replace(request=asked)))
     assert run_plan("sphere", [], None, tmp_path / "plan.json", timed=True) == NOT_FOUND
     assert "sphere: plan_failed: the timed motion is not clear at" in capsys.readouterr().out
     assert not (tmp_path / "plan.json").exists()
@@ -185,7 +187,7 @@ def test_a_seed_decides_everything(tmp_path):
 def test_the_written_plan_can_be_judged_by_others(tmp_path):
     assert run_plan("wall_gap", [], None, tmp_path / "plan.json") == 0
     log = read_log(tmp_path / "plan.json")
-    assert digest_of(log) == digest_of(planned("wall_gap").log)
+    assert digest_of(log) == digest_of(planned("wall_gap").plan.log())
     assert certify(log).ok
     table = json.loads((tmp_path / "plan.json").read_text())
     table["obstacles"][1]["pose"][5] += 0.01
@@ -227,7 +229,7 @@ obstacles: [{{name: tray, shape: box, size: [0.3, 0.3, 0.02], position: [0.45, 0
     assert apart.plan.reason == "goal in collision"
     together = plan_in(load_scene(file, ["allowed=[[cup, tray]]"]))
     assert together.plan.reason == ""
-    assert certify(together.log).ok
+    assert certify(together.plan.log()).ok
 
 
 @pytest.mark.parametrize(

@@ -31,8 +31,8 @@ from onedemo.bench.report.report import write_report, write_report_of
 from onedemo.bench.report.tables import number, p_words
 from onedemo.bench.statistics import holm, mcnemar
 from onedemo.bench.workers.dispatcher import ERROR, HUNG, WORKER_DIED
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.run_config import RunConfig
-from onedemo.planner.errors import BadConfig
 
 HOSTILE = [
     "<script>document.title = 'ours'</script>",

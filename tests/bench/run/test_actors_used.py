@@ -7,13 +7,14 @@ import pytest
 from helpers.actors import random_actor
 
 import onedemo.envs  # noqa: F401  (registers the ids)
+from onedemo.baselines.errors import BadActor
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.learning.actor_files import save_actor
 from onedemo.bench.report.groups import Group
 from onedemo.bench.report.tables import costs
 from onedemo.bench.run.actors_used import with_actors
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.grid import load_grid
-from onedemo.planner.errors import BadActor, BadConfig
 
 TEXT = """
 name: own

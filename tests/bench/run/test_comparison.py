@@ -18,8 +18,9 @@ from onedemo.bench.run.episode_jobs import EpisodeJobs
 from onedemo.bench.workers.dispatcher import ERROR, Dispatcher
 from onedemo.bench.workers.executors import Serial, executor_for
 from onedemo.bench.workers.processes import Processes, command_of
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.run_config import RunSettings
-from onedemo.planner.errors import BadConfig, OneDemoError
+from onedemo.planner.errors import OneDemoError
 
 # the time limit keeps it short: none of these succeeds
 GRID = """
@@ -200,9 +201,9 @@ def test_five_hundred_episodes_leave_nothing_in_memory(tmp_path):
 
 def test_no_room_is_a_scenario_that_cannot_be_drawn(monkeypatch, tmp_path):
     from onedemo.envs.core import environment as base
-    from onedemo.planner.errors import NoRoom
+    from onedemo.envs.errors import NoRoom
 
-    drawn = base.OneDemoEnv._started
+    drawn = base.TaskEnv._started
 
     def sometimes(self, options):
         start = drawn(self, options)
@@ -210,7 +211,7 @@ def test_no_room_is_a_scenario_that_cannot_be_drawn(monkeypatch, tmp_path):
             raise NoRoom("static")
         return start
 
-    monkeypatch.setattr(base.OneDemoEnv, "_started", sometimes)
+    monkeypatch.setattr(base.TaskEnv, "_started", sometimes)
     grid = grid_in(tmp_path, GRID.partition("sweep")[0].replace("episodes: 2", "episodes: 6"))
     records = completed(grid, tmp_path / "run", Serial(EpisodeJobs()))
     suite = read_suite(tmp_path / "run")

@@ -16,7 +16,7 @@ from onedemo.bench.episodes.episode_records import FILE, RecordWriter, read_reco
 from onedemo.bench.episodes.run_folder import Shard, gather, parsed_shard, recorded, table_hash
 from onedemo.bench.episodes.scenarios import check_mergeable, read_suite
 from onedemo.bench.run.finish import report
-from onedemo.planner.errors import BadConfig
+from onedemo.configs.errors import BadConfig
 
 
 def test_a_run_that_is_killed_at_any_moment_loses_no_finished_episode(tmp_path):

@@ -17,8 +17,8 @@ from onedemo.bench.run.episode_jobs import EpisodeJobs
 from onedemo.bench.workers.dispatcher import HUNG, Dispatcher
 from onedemo.bench.workers.executors import executor_for
 from onedemo.bench.workers.ray_actors import PATIENCE, RayActors, check_reachable
+from onedemo.configs.errors import BadConfig
 from onedemo.configs.run_config import RunSettings
-from onedemo.planner.errors import BadConfig
 
 
 @pytest.fixture

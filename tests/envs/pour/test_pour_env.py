@@ -291,7 +291,7 @@ def test_bad_arguments_are_named(options, message):
 def test_levels_put_seeded_obstacles_that_leave_room_at_the_start(env, level):
     for seed in range(3):
         first, info = env.reset(seed=seed, options={"level": level})
-        assert 1 <= len(env.sim.obstacles.intruders) <= 3
+        assert 1 <= len(env.sim.obstacles.scheduled_obstacles) <= 3
         if env.sim.obstacles.active.any():
             assert info["min_obstacle_distance"] >= 0.05 - 1e-6
         again, _ = env.reset(seed=seed, options={"level": level})

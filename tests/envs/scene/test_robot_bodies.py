@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -17,8 +19,8 @@ from onedemo.planner.geometry.shapes import Box, Cylinder
     "robot", ["Panda", *[pytest.param(name, marks=pytest.mark.slow) for name in sorted(set(ROBOTS) - {"Panda"})]]
 )
 def test_the_shipped_table_is_what_is_fitted(robot):
-    for k, body in enumerate(fitted_bodies(robot)):
-        shipped = robot_body(robot, k)
+    for k, body in enumerate(fitted_bodies(ROBOTS[robot])):
+        shipped = robot_body(ROBOTS[robot], k)
         assert shipped.names == body.names
         # another machine's optimizer may end elsewhere: the same to a millimetre
         np.testing.assert_allclose(shipped.rows[:, 7], body.rows[:, 7], atol=1e-3)
@@ -26,7 +28,7 @@ def test_the_shipped_table_is_what_is_fitted(robot):
 
 @pytest.mark.parametrize("robot", sorted(ROBOTS))
 def test_the_shipped_capsules_hold_every_corner_of_the_links(robot):
-    scene, body = compiled_scene(robot), robot_body(robot)
+    scene, body = compiled_scene(ROBOTS[robot]), robot_body(ROBOTS[robot])
     model, index = scene.model, scene.arms[0]
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     for _ in range(20):
@@ -53,14 +55,15 @@ def link_corners(model, data, body):
 
 def outside(body, arm, q, joint, corners):
     """How far [m] the farthest corner is outside of all capsules that move with a joint."""
-    from onedemo.planner.collision.robot_arrays import WORLD, place_capsules, robot_arrays
+    from onedemo.planner.collision.capsule_placement import place_capsules
+    from onedemo.planner.collision.robot_arrays import ROW, robot_arrays
     from onedemo.planner.geometry.shapes import pack
 
     g = robot_arrays((arm,), (body,), pack(()))
-    place_capsules(g, q, WORLD)
+    place_capsules(g, q, ROW.placed)
     best = np.full(len(corners), np.inf)
     for k in np.flatnonzero(body.rows[:, 0] == joint):
-        a, b = g[WORLD + k, :3], g[WORLD + k, 3:6]
+        a, b = g[ROW.placed + k, :3], g[ROW.placed + k, 3:6]
         t = np.clip((corners - a) @ (b - a) / max((b - a) @ (b - a), 1e-18), 0.0, 1.0)
         best = np.minimum(best, np.linalg.norm(corners - a - t[:, None] * (b - a), axis=1) - body.rows[k, 7])
     return best.max()
@@ -68,11 +71,11 @@ def outside(body, arm, q, joint, corners):
 
 def test_robots_without_a_table_are_named():
     with pytest.raises(UnknownName, match="known: Panda"):
-        robot_body("R2D2")
+        robot_body(replace(ROBOTS["Panda"], name="R2D2"))
 
 
 def test_the_static_scene_is_the_table_and_the_stand():
-    things = {thing.name: thing for thing in compiled_scene("Panda").fixtures}
+    things = {thing.name: thing for thing in compiled_scene(ROBOTS["Panda"]).fixtures}
     table = things["table"]
     assert table.shape == Box((0.8, 0.8, 0.05))
     assert table.pose.position[2] + 0.025 == pytest.approx(0.8)

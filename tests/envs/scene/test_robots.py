@@ -14,14 +14,14 @@ from onedemo.envs.scene.baxter_trunk import slices
 from onedemo.envs.scene.body_clearance import arm_clearance
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.robot_description import PARKED
-from onedemo.envs.scene.robots import ROBOTS, places_of
+from onedemo.envs.scene.robots import ROBOTS, places_of, robot_named
 from onedemo.envs.scene.scene import ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, WORLD, compiled_scene
 from onedemo.envs.scene.scene_objects import NOTHING
 from onedemo.envs.shelve.places import SHELF_PLACES
 from onedemo.envs.simulation.simulation import Simulation, Start
 from onedemo.envs.stack.rules import allowed_contact
-from onedemo.planner.collision.robot_arrays import WORLD as CAPSULES
-from onedemo.planner.collision.robot_arrays import place_capsules, robot_arrays
+from onedemo.planner.collision.capsule_placement import place_capsules
+from onedemo.planner.collision.robot_arrays import ROW, robot_arrays
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.geometry.shapes import pack
 
@@ -61,8 +61,8 @@ def test_it_goes_where_it_is_told_and_stands_still(robot):
 
 @each_robot
 def test_at_the_start_nothing_touches_and_the_hand_points_down(robot):
-    scene = compiled_scene(robot)
-    sim = Simulation(robot, NOTHING)
+    scene = compiled_scene(ROBOTS[robot])
+    sim = Simulation(ROBOTS[robot], NOTHING)
     sim.reset(Start(scene.home, np.zeros((0, 7))))
     assert sim.data.ncon == 0
     assert scene.arms[0].arm.margin(scene.home[0]) > 0.3
@@ -71,7 +71,7 @@ def test_at_the_start_nothing_touches_and_the_hand_points_down(robot):
 
 @each_arm
 def test_kinematics_are_mujocos(robot, side):
-    scene = compiled_scene(robot, NOTHING, (side,))
+    scene = compiled_scene(ROBOTS[robot], NOTHING, (side,))
     index, data, rng = scene.arms[0], mujoco.MjData(scene.model), np.random.default_rng(1)
     for _ in range(50):
         q = rng.uniform(index.arm.lower, index.arm.upper)
@@ -84,9 +84,9 @@ def test_kinematics_are_mujocos(robot, side):
 
 @each_arm
 def test_the_capsules_hold_the_collision_geometry(robot, side):
-    scene = compiled_scene(robot, NOTHING, (side,))
+    scene = compiled_scene(ROBOTS[robot], NOTHING, (side,))
     index, data, rng = scene.arms[0], mujoco.MjData(scene.model), np.random.default_rng(2)
-    body = robot_body(robot, list(ROBOTS[robot].ready).index(side))
+    body = robot_body(ROBOTS[robot], list(ROBOTS[robot].ready).index(side))
     g = robot_arrays((index.arm,), (body,), pack(()))
     joints = [int(scene.model.joint(name).bodyid[0]) for name in index.arm.joint_names]
     for _ in range(5):
@@ -94,12 +94,12 @@ def test_the_capsules_hold_the_collision_geometry(robot, side):
         data.qpos[index.qpos] = q
         data.qpos[index.finger_qpos] = index.finger_open
         mujoco.mj_kinematics(scene.model, data)
-        place_capsules(g, q, CAPSULES)
+        place_capsules(g, q, ROW.placed)
         for part in sorted(index.bodies | index.fingers):
             frame = max(joints.index(above) for above in ancestors(scene.model, part) if above in joints)
             points = surface(scene.model, data, part)
             if len(points):
-                rows = CAPSULES + np.flatnonzero(body.rows[:, 0] == frame)
+                rows = ROW.placed + np.flatnonzero(body.rows[:, 0] == frame)
                 radii = body.rows[body.rows[:, 0] == frame, 7]
                 assert outside(points, g[rows, :6], radii).max() < 1e-4, scene.model.body(part).name
 
@@ -167,16 +167,16 @@ def test_an_arm_may_not_touch_trunk_nor_other_arm():
     for pair in ((ARM, OTHER_ARM), (FINGERS, OTHER_ARM), (WORLD, ARM), (WORLD, OTHER_ARM), (ARM, OTHER_FINGERS)):
         assert not allowed_contact(*pair, 0), pair
     assert allowed_contact(OTHER_ARM, OTHER_FINGERS, 0)
-    scene = compiled_scene("Baxter")
+    scene = compiled_scene(ROBOTS["Baxter"])
     torso = [geom for geom, label in enumerate(scene.labels) if label == "torso"]
     assert len(torso) > 6
     assert set(scene.owner[torso]) == {WORLD}
 
 
 def test_the_slices_of_the_trunk_leave_the_shoulder_its_room():
-    scene = compiled_scene("Baxter")
+    scene = compiled_scene(ROBOTS["Baxter"])
     torso = pack([fixture for fixture in scene.fixtures if fixture.name == "torso"])
-    arm, body = scene.arms[0].arm, robot_body("Baxter")
+    arm, body = scene.arms[0].arm, robot_body(ROBOTS["Baxter"])
     upper = range(2, 3)
     inwards = [arm_clearance(arm, body, np.array([s0, -0.6, 0, 1, 0, 0, 0]), torso, upper) for s0 in (-1.2, 0.0, 1.2)]
     assert min(inwards) > 0.05
@@ -201,7 +201,7 @@ def test_what_cannot_be_is_refused_in_a_line():
     with pytest.raises(BadOption, match="Panda has no arm 'left'; it has: right"):
         gym.make("onedemo/Stack-v0", arm="left")
     with pytest.raises(BadOption, match="Baxter cannot hold a book, 80 mm wide: its gripper holds 16 to 56 mm"):
-        ROBOTS["Baxter"].check_grip(0.08, "Baxter", "a book")
+        ROBOTS["Baxter"].check_grip(0.08, "a book")
     with pytest.raises(UnknownName, match="unknown robot 'R2D2'; known: Panda, Baxter"):
         gym.make("onedemo/Stack-v0", robot="R2D2")
     with pytest.raises(BadOption, match="Panda has one arm"):
@@ -210,14 +210,14 @@ def test_what_cannot_be_is_refused_in_a_line():
 
 def test_a_robot_without_places_is_refused_in_one_line_with_the_reason():
     with pytest.raises(BadOption, match="'robot': UR5e cannot pour: its arm is too short") as caught:
-        places_of({"UR5e": "its arm is too short"}, "UR5e", "pour")
+        places_of({"UR5e": "its arm is too short"}, ROBOTS["UR5e"], "pour")
     assert "\n" not in str(caught.value)
     with pytest.raises(BadOption, match="'robot': Kinova3 cannot shelve: its wrist"):
         gym.make("onedemo/Shelve-v0", robot="Kinova3")
     with pytest.raises(BadOption, match="Sawyer cannot pour: no places were made for it"):
-        places_of({}, "Sawyer", "pour")
+        places_of({}, ROBOTS["Sawyer"], "pour")
     with pytest.raises(UnknownName, match="unknown robot 'R2D2'; known: Panda, Baxter"):
-        places_of({}, "R2D2", "pour")
+        robot_named("R2D2")
 
 
 @each_robot
@@ -256,4 +256,4 @@ def test_most_starts_are_within_reach_of_the_demonstration(task, robot):
 
 @each_robot
 def test_a_gripper_opens_as_far_as_its_facts_say(robot):
-    assert Simulation(robot, NOTHING).widest_opening(0) == pytest.approx(ROBOTS[robot].opening, abs=1e-6)
+    assert Simulation(ROBOTS[robot], NOTHING).widest_opening(0) == pytest.approx(ROBOTS[robot].opening, abs=1e-6)

@@ -300,6 +300,6 @@ def test_an_unknown_shelf_is_named():
 
 def test_the_papers_obstacles_are_of_different_size_and_appear_with_the_last_two_books(env):
     env.reset(seed=0, options={"obstacles": "paper", "level": "L1"})
-    first, second = env.sim.obstacles.intruders
+    first, second = env.sim.obstacles.scheduled_obstacles
     assert (first.motion, second.motion) == (3, 5)
     assert first.shape != second.shape

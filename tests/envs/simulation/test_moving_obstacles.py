@@ -16,15 +16,9 @@ from scipy.spatial import ConvexHull
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.programs.world_model import obstacles_in
-from onedemo.envs.core.obstacle_placement import (
-    FASTEST,
-    LARGEST,
-    NEAR,
-    SMALLEST,
-    START_CLEARANCE,
-    PlacementContext,
-    PlacementMotion,
-)
+from onedemo.envs import ROBOTS
+from onedemo.envs.core.obstacle_placement import FASTEST, LARGEST, SMALLEST
+from onedemo.envs.core.placement_context import NEAR, START_CLEARANCE, PlacementContext, PlacementMotion
 from onedemo.envs.scene.body_clearance import capsule_ends
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import ARM, FINGERS, compiled_scene
@@ -220,7 +214,7 @@ def test_one_that_appears_waits_for_its_motion_its_delay_and_for_room(env, monke
 def test_levels_put_seeded_obstacles_that_leave_room_at_the_start(env, level, kinds):
     for seed in range(3):
         first, info = env.reset(seed=seed, options={"level": level})
-        intruders = env.sim.obstacles.intruders
+        intruders = env.sim.obstacles.scheduled_obstacles
         assert 1 <= len(intruders) <= (3 if level == "L3" else 1)
         assert all((not each.frequency and not each.motion) == (kinds == "still") for each in intruders)
         for each in intruders:
@@ -238,9 +232,9 @@ def test_levels_put_seeded_obstacles_that_leave_room_at_the_start(env, level, ki
 def test_still_obstacles_overlap_what_hand_and_block_sweep_and_no_object(env):
     for seed in range(4):
         observation, _ = env.reset(seed=seed, options={"level": "L3"})
-        for each in env.sim.obstacles.intruders:
-            block = Pose.from_vector(observation["object_pose"][each.leg]).position
-            goal = Pose.from_vector(observation["goal_pose"][each.leg]).position
+        for each in env.sim.obstacles.scheduled_obstacles:
+            block = Pose.from_vector(observation["object_pose"][each.blocked_motion]).position
+            goal = Pose.from_vector(observation["goal_pose"][each.blocked_motion]).position
             middle = np.array(each.center)
             along = np.dot(middle[:2] - block[:2], goal[:2] - block[:2]) / np.linalg.norm(goal[:2] - block[:2]) ** 2
             aside = np.linalg.norm(middle[:2] - block[:2] - along * (goal[:2] - block[:2]))
@@ -280,14 +274,14 @@ def test_nothing_appears_nearer_than_promised(monkeypatch):
 
 def a_stage(straight=1):
     """A Panda that must reach one place from one side, in three poses on a line."""
-    arm, body = compiled_scene("Panda").arms[0].arm, robot_body("Panda")
+    arm, body = compiled_scene(ROBOTS["Panda"]).arms[0].arm, robot_body(ROBOTS["Panda"])
     joints = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
     tcp = arm.fk(joints)
     keys = [Pose.from_position_quaternion([0.05 * k, 0.0, 0.0]) @ tcp for k in range(3)]
-    leg = PlacementMotion(
+    motion = PlacementMotion(
         tcp, keys[-1], tuple((key,) for key in keys), Sphere(0.01), Pose.identity(), 0, straight=straight
     )
-    return PlacementContext([leg], arm, body, joints, [], [], 0.0), keys
+    return PlacementContext([motion], arm, body, joints, [], [], 0.0), keys
 
 
 def test_obstacles_that_each_leave_a_posture_but_together_none_are_seen():

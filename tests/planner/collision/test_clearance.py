@@ -14,56 +14,28 @@ from hypothesis import strategies as st
 from soak import facing_pandas, frames_of, panda_body, panda_pairs, random_body, random_obstacles
 
 from onedemo.planner import jit
-from onedemo.planner.collision.clearance import (
-    FIRST,
-    GAP,
-    KEEP,
-    KIND,
-    OTHER,
-    SELF_MARGIN,
-    bound_motion,
-    capsule_distance,
-    find_near,
-    min_slack,
-    near_pair_slack,
-    obstacle_distance,
-    reach_of,
-    slack_at,
-    step_stays_clear,
-)
+from onedemo.planner.collision.capsule_placement import place_capsules
+from onedemo.planner.collision.clearance import capsule_distance, find_near, min_slack, obstacle_distance, slack_at
 from onedemo.planner.collision.edge_certificates import is_clear, tool_arrays, tool_slack
-from onedemo.planner.collision.robot_arrays import (
-    BOUNDS,
-    HEADER,
-    HIGH,
-    LOW,
-    N_NEAR,
-    NEAR,
-    NEXT,
-    OBSTACLES,
-    SETTINGS,
-    STEP,
-    W_REACH,
-    WORLD,
-    place_capsules,
-    robot_arrays,
-)
+from onedemo.planner.collision.robot_arrays import CAPSULE, HEADER, NEAR_PAIR, PLACED, ROW, SETTING, robot_arrays
+from onedemo.planner.collision.step_certificates import bound_motion, near_pair_slack, reach_of, step_stays_clear
 from onedemo.planner.geometry import screw
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere, pack
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body
 from onedemo.planner.safety.barrier import _lay_bounds
+from onedemo.planner.safety.qp import QP
 from onedemo.planner.safety.safety_layer import SafetySettings
 
 seeds = st.integers(0, 10**6)
 SHARE = float(os.environ.get("ONEDEMO_SOAK", "1"))
 """Scales the long runs."""
 lay_bounds = jit.numba.njit(error_model="numpy")(lambda g, q: _lay_bounds(g, q))
-SETTING = SafetySettings(distance=0.01, self_distance=0.015, shell=0.5)
+SAFETY = SafetySettings(distance=0.01, self_distance=0.015, shell=0.5)
 
 
-def work_of(arm: Arm, body: Body, obstacles, pairs=(), masks=(), setting: SafetySettings = SETTING) -> np.ndarray:
+def work_of(arm: Arm, body: Body, obstacles, pairs=(), masks=(), setting: SafetySettings = SAFETY) -> np.ndarray:
     return robot_arrays(
         [arm],
         [body],
@@ -88,19 +60,19 @@ def robot(seed: int, moving: bool = False):
 
 
 def near_rows(g) -> np.ndarray:
-    first = int(g[HEADER, NEAR])
-    return g[first : first + int(g[HEADER, N_NEAR])]
+    first = int(g[ROW.header, HEADER.first_near])
+    return g[first : first + int(g[ROW.header, HEADER.near])]
 
 
-def all_gaps(g, world: int = WORLD) -> dict[tuple, float]:
+def all_gaps(g, world: int = ROW.placed) -> dict[tuple, float]:
     """Distance of every pair, one by one."""
-    capsules, obstacles, pairs = (int(g[HEADER, k]) for k in (2, 3, 4))
+    capsules, obstacles, pairs = (int(g[ROW.header, k]) for k in (HEADER.capsules, HEADER.obstacles, HEADER.pairs))
     gaps = {}
     for c in range(capsules):
-        if g[84 + c, 1] >= 0:
+        if g[ROW.body + c, CAPSULE.frame] >= 0:
             for k in range(obstacles):
                 gaps[0, c, k] = obstacle_distance(g, world, c, k, 0.0, 1e3)
-    for i, j in g[OBSTACLES + obstacles : OBSTACLES + obstacles + pairs, :2].astype(int):
+    for i, j in g[ROW.obstacles + obstacles : ROW.obstacles + obstacles + pairs, :2].astype(int):
         gaps[1, i, j] = capsule_distance(g, world, i, j)
     return gaps
 
@@ -108,29 +80,35 @@ def all_gaps(g, world: int = WORLD) -> dict[tuple, float]:
 @for_all(seeds, st.sampled_from([0.02, 0.1, 0.5, 2.0]), max_examples=60)
 def test_the_near_pairs_are_all_that_are_near(seed, shell):
     g, arm, _, rng = robot(seed)
-    place_capsules(g, rng.uniform(-2, 2, arm.dof), WORLD)
+    place_capsules(g, rng.uniform(-2, 2, arm.dof), ROW.placed)
     least = find_near(g, shell)
-    found = {(int(r[KIND]), int(r[FIRST]), int(r[OTHER])): r[GAP] for r in near_rows(g)}
+    found = {
+        (int(r[NEAR_PAIR.self_pair]), int(r[NEAR_PAIR.capsule]), int(r[NEAR_PAIR.other])): r[NEAR_PAIR.distance]
+        for r in near_rows(g)
+    }
     wanted = {pair: gap for pair, gap in all_gaps(g).items() if gap <= shell}
     assert found.keys() == wanted.keys() and len(near_rows(g)) == len(found)
     for pair, gap in wanted.items():
         assert found[pair] == pytest.approx(gap, abs=1e-12)
-    rooms = [gap - (SETTING.self_distance if pair[0] else SETTING.distance) for pair, gap in wanted.items()]
+    rooms = [gap - (SAFETY.self_distance if pair[0] else SAFETY.distance) for pair, gap in wanted.items()]
     if rooms:
         assert least == pytest.approx(min(rooms), abs=1e-12) == pytest.approx(near_pair_slack(g, -1, 0.0), abs=1e-12)
-    assert all(r[KEEP] == (SETTING.self_distance if r[KIND] else SETTING.distance) for r in near_rows(g))
+    assert all(
+        r[NEAR_PAIR.margin] == (SAFETY.self_distance if r[NEAR_PAIR.self_pair] else SAFETY.distance)
+        for r in near_rows(g)
+    )
 
 
 @for_all(seeds, st.floats(-0.2, 1.0), max_examples=60)
 def test_the_smallest_room_is_that_of_all_pairs_up_to_the_cutoff(seed, cutoff):
     g, arm, _, rng = robot(seed)
     q = rng.uniform(-2, 2, arm.dof)
-    place_capsules(g, q, WORLD)
-    rooms = [gap - (SETTING.self_distance if pair[0] else SETTING.distance) for pair, gap in all_gaps(g).items()]
+    place_capsules(g, q, ROW.placed)
+    rooms = [gap - (SAFETY.self_distance if pair[0] else SAFETY.distance) for pair, gap in all_gaps(g).items()]
     least = min([100.0, *rooms])
     assert slack_at(g, q, 0.0, 100.0) == pytest.approx(least, abs=1e-12)
     assert slack_at(g, q, 0.0, cutoff) == pytest.approx(min(least, cutoff), abs=1e-12)
-    assert min_slack(g, WORLD, 0.0, 100.0) == slack_at(g, q, 0.0, 100.0)
+    assert min_slack(g, ROW.placed, 0.0, 100.0) == slack_at(g, q, 0.0, 100.0)
 
 
 @for_all(seeds, max_examples=40)
@@ -138,7 +116,7 @@ def test_capsules_stand_where_independent_kinematics_puts_them(seed):
     g, arm, body, rng = robot(seed)
     q = rng.uniform(-3, 3, arm.dof)
     frames = frames_of(arm, q)
-    for world in (WORLD, NEXT):
+    for world in (ROW.placed, ROW.placed_next):
         place_capsules(g, q, world)
         for c, row in enumerate(body.rows):
             frame = frames[int(row[0]) + 1]
@@ -156,9 +134,9 @@ def test_masked_pairs_fixed_parts_and_own_margins():
     rooms = {}
     for masks in ((0, 0), (0b10, 0), (0b01, 0), (0b10, 0b10)):
         g = work_of(arm, body, obstacles, masks=masks)
-        place_capsules(g, q, WORLD)
+        place_capsules(g, q, ROW.placed)
         find_near(g, 10.0)
-        rooms[masks] = [tuple(row[[FIRST, OTHER, KEEP]]) for row in near_rows(g)]
+        rooms[masks] = [tuple(row[[NEAR_PAIR.capsule, NEAR_PAIR.other, NEAR_PAIR.margin]]) for row in near_rows(g)]
     assert rooms[0, 0] == rooms[0b01, 0] == [(1, 0, 0.01), (1, 1, 0.03)]
     assert rooms[0b10, 0] == [(1, 1, 0.03)] and rooms[0b10, 0b10] == []
 
@@ -168,30 +146,34 @@ def test_bounds_are_the_derivatives_of_the_distances(seed):
     """Central differences; the pair's need holds the obstacle's own velocity."""
     g, arm, _, rng = robot(seed, moving=True)
     q, n = rng.uniform(-2, 2, arm.dof), arm.dof
-    place_capsules(g, q, WORLD)
+    place_capsules(g, q, ROW.placed)
     find_near(g, 0.5)
     lay_bounds(g, q)
-    rows, first = near_rows(g).copy(), int(g[HEADER, BOUNDS])
+    rows, first = near_rows(g).copy(), int(g[ROW.header, HEADER.first_bound])
     bounds = g[first : first + len(rows)].copy()
     for row, bound in zip(rows, bounds, strict=True):
-        if row[GAP] < 1e-3:
+        if row[NEAR_PAIR.distance] < 1e-3:
             continue
 
         def gap(q, seconds, row=row):
-            place_capsules(g, q, NEXT)
-            i, j = int(row[FIRST]), int(row[OTHER])
-            return capsule_distance(g, NEXT, i, j) if row[KIND] else obstacle_distance(g, NEXT, i, j, seconds, 1e3)
+            place_capsules(g, q, ROW.placed_next)
+            i, j = int(row[NEAR_PAIR.capsule]), int(row[NEAR_PAIR.other])
+            return (
+                capsule_distance(g, ROW.placed_next, i, j)
+                if row[NEAR_PAIR.self_pair]
+                else obstacle_distance(g, ROW.placed_next, i, j, seconds, 1e3)
+            )
 
         h = 1e-5
         for i in range(n):
             e = h * np.eye(n)[i]
             plus, minus = gap(q + e, 0.0), gap(q - e, 0.0)
-            if abs(plus + minus - 2 * row[GAP]) < 1e-7:  # no kink in between
+            if abs(plus + minus - 2 * row[NEAR_PAIR.distance]) < 1e-7:  # no kink in between
                 assert bound[i] == pytest.approx((plus - minus) / (2 * h), abs=2e-4)
-        assert not bound[n:16].any()
-        closing = 0.0 if row[KIND] else (gap(q, -h) - gap(q, h)) / (2 * h)
-        room = row[GAP] - row[KEEP] - SETTING.buffer
-        assert bound[32] == pytest.approx(closing - SETTING.alpha * room, abs=2e-4)
+        assert not bound[n : QP.image].any()
+        closing = 0.0 if row[NEAR_PAIR.self_pair] else (gap(q, -h) - gap(q, h)) / (2 * h)
+        room = row[NEAR_PAIR.distance] - row[NEAR_PAIR.margin] - SAFETY.buffer
+        assert bound[QP.bound] == pytest.approx(closing - SAFETY.alpha * room, abs=2e-4)
 
 
 def test_the_last_bounds_are_the_speeds_that_each_joint_may_have():
@@ -200,17 +182,17 @@ def test_the_last_bounds_are_the_speeds_that_each_joint_may_have():
     g = work_of(arm, POINT, [])
     for q in ([0.0, 0.0, 0.0], [1.0, -1.0, 0.99], [-0.999, 0.9, 1.0]):
         q = np.array(q)
-        place_capsules(g, q, WORLD)
+        place_capsules(g, q, ROW.placed)
         find_near(g, 0.5)
         assert lay_bounds(g, q) == 6
-        first = int(g[HEADER, BOUNDS])
+        first = int(g[ROW.header, HEADER.first_bound])
         rows = g[first : first + 6]
         np.testing.assert_array_equal(rows[:, :3], np.repeat(np.eye(3), 2, axis=0) * np.tile([1, -1], 3)[:, None])
-        gain = SETTING.limit_gain
+        gain = SAFETY.limit_gain
         low, high = np.maximum(-1.0, gain * (-1.0 - q)), np.minimum(1.0, gain * (1.0 - q))
-        np.testing.assert_allclose(rows[::2, 32], low, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(rows[1::2, 32], -high, rtol=0, atol=1e-12)
-        assert not rows[:, 33].any()
+        np.testing.assert_allclose(rows[::2, QP.bound], low, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rows[1::2, QP.bound], -high, rtol=0, atol=1e-12)
+        assert not rows[:, QP.softness].any()
 
 
 def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
@@ -218,26 +200,30 @@ def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
     robot, rng = facing_pandas(), np.random.default_rng(0)
     ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.4, 0, 0.4]))
     g = robot_arrays(
-        robot.arms, robot.bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SETTING.packed(0.01)
+        robot.arms, robot.bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SAFETY.packed(0.01)
     )
     checked = 0
     for _ in range(5):
-        q = rng.uniform(g[LOW, :14], g[HIGH, :14])
-        place_capsules(g, q, WORLD)
+        q = rng.uniform(g[ROW.lower, :14], g[ROW.upper, :14])
+        place_capsules(g, q, ROW.placed)
         find_near(g, 0.3)
         lay_bounds(g, q)
-        rows, first = near_rows(g).copy(), int(g[HEADER, BOUNDS])
+        rows, first = near_rows(g).copy(), int(g[ROW.header, HEADER.first_bound])
         bounds = g[first : first + len(rows), :14].copy()
         for row, bound in zip(rows, bounds, strict=True):
-            i, j = int(row[FIRST]), int(row[OTHER])
-            if row[GAP] < -0.02:
+            i, j = int(row[NEAR_PAIR.capsule]), int(row[NEAR_PAIR.other])
+            if row[NEAR_PAIR.distance] < -0.02:
                 continue
             slopes = []
             for e in 1e-6 * np.eye(14):
                 gaps = []
                 for sign in (1, -1):
-                    place_capsules(g, q + sign * e, NEXT)
-                    gap = capsule_distance(g, NEXT, i, j) if row[KIND] else obstacle_distance(g, NEXT, i, j, 0.0, 1e3)
+                    place_capsules(g, q + sign * e, ROW.placed_next)
+                    gap = (
+                        capsule_distance(g, ROW.placed_next, i, j)
+                        if row[NEAR_PAIR.self_pair]
+                        else obstacle_distance(g, ROW.placed_next, i, j, 0.0, 1e3)
+                    )
                     gaps.append(gap)
                 slopes.append((gaps[0] - gaps[1]) / 2e-6)
             checked += 1
@@ -253,13 +239,13 @@ def test_no_point_of_a_core_goes_farther_than_its_bound(seed, exponent):
     body = random_body(arm, rng)
     g = work_of(arm, body, [])
     q, step = rng.uniform(-2, 2, arm.dof), 10**exponent * rng.normal(size=arm.dof) * (rng.uniform(size=arm.dof) < 0.7)
-    place_capsules(g, q, WORLD)
-    bound_motion(g, WORLD, step)
-    bound = g[WORLD : WORLD + len(body), W_REACH].copy()
+    place_capsules(g, q, ROW.placed)
+    bound_motion(g, ROW.placed, step)
+    bound = g[ROW.placed : ROW.placed + len(body), PLACED.reach].copy()
     places = []
     for s in np.linspace(0, 1, 60):
-        place_capsules(g, q + s * step, NEXT)
-        ends = g[NEXT : NEXT + len(body), :6].reshape(-1, 2, 3)
+        place_capsules(g, q + s * step, ROW.placed_next)
+        ends = g[ROW.placed_next : ROW.placed_next + len(body), :6].reshape(-1, 2, 3)
         places.append(np.concatenate([ends, ends.mean(axis=1, keepdims=True)], axis=1))
     ways = np.linalg.norm(np.diff(places, axis=0), axis=3).sum(axis=0).max(axis=1)
     assert (ways <= bound + 1e-12).all()
@@ -275,12 +261,12 @@ def test_the_bound_grows_with_a_lever_that_a_later_joint_lengthens():
         g = work_of(arm, Body(np.array([[1, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.02]]), ("ball",)), [])
 
         def farthest_way(q, step, g=g):
-            place_capsules(g, q, WORLD)
-            bound_motion(g, WORLD, step)
-            bound, places = g[WORLD, W_REACH], []
+            place_capsules(g, q, ROW.placed)
+            bound_motion(g, ROW.placed, step)
+            bound, places = g[ROW.placed, PLACED.reach], []
             for s in np.linspace(0, 1, 200):
-                place_capsules(g, q + s * step, NEXT)
-                places.append(g[NEXT, :3].copy())
+                place_capsules(g, q + s * step, ROW.placed_next)
+                places.append(g[ROW.placed_next, :3].copy())
             return bound, np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
 
         turns = [np.array([0.0, turn]) for turn in np.linspace(-3, 3, 121)]
@@ -296,9 +282,9 @@ def test_the_bound_of_one_joint_is_its_arc():
     arm = random_arm(1, 1, 0.0)
     body = Body(np.array([[0, 0.3, 0.4, 0.1, 0.3, 0.4, 0.7, 0.02]]), ("rod",))
     g = work_of(arm, body, [])
-    place_capsules(g, np.zeros(1), WORLD)
-    bound_motion(g, WORLD, np.array([-0.2]))
-    assert g[WORLD, W_REACH] == pytest.approx(0.2 * 0.5, abs=1e-12)
+    place_capsules(g, np.zeros(1), ROW.placed)
+    bound_motion(g, ROW.placed, np.array([-0.2]))
+    assert g[ROW.placed, PLACED.reach] == pytest.approx(0.2 * 0.5, abs=1e-12)
 
 
 # ------------------------------------------------------------------ steps
@@ -306,9 +292,9 @@ def test_the_bound_of_one_joint_is_its_arc():
 
 def proven(g, q, step, dt: float) -> bool:
     """What the guard asks: are all pairs that can matter clear during a step?"""
-    place_capsules(g, q, WORLD)
-    g[STEP, : len(q)] = step
-    find_near(g, reach_of(g, g[STEP], dt))
+    place_capsules(g, q, ROW.placed)
+    g[ROW.step, : len(q)] = step
+    find_near(g, reach_of(g, g[ROW.step], dt))
     return bool(step_stays_clear(g, q, step, dt))
 
 
@@ -413,7 +399,7 @@ def test_a_path_of_one_joint_bends_towards_the_wall():
     for angle in (0.1, 0.4, 1.0):
         bulge = 0.5 * (1.0 - math.cos(0.5 * angle))
         for share, clear in ((0.3, False), (0.9, False), (0.99, False), (1.5, True)):
-            face = 0.5 * math.cos(0.5 * angle) + share * bulge + SETTING.distance + 0.02
+            face = 0.5 * math.cos(0.5 * angle) + share * bulge + SAFETY.distance + 0.02
             wall = Obstacle(Box((10, 10, 10)), Pose.from_position_quaternion([face + 5.0, 0, 0]))
             g = work_of(arm, body, [wall])
             assert proven(g, np.array([-0.5 * angle]), np.array([angle]), 1.0) == clear
@@ -440,7 +426,7 @@ def folded_case(q1: float, step, share: float):
     n /= np.linalg.norm(n)
     heights = [n @ tip(s) for s in np.linspace(0, 1, 101)]
     ends, low = min(heights[0], heights[-1]), min(heights)
-    face = ends - share * (ends - low) - SETTING.distance - 0.02
+    face = ends - share * (ends - low) - SAFETY.distance - 0.02
     turn = Pose.from_position_quaternion(np.zeros(3), [math.cos(a := 0.5 * math.atan2(n[1], n[0])), 0, 0, math.sin(a)])
     wall = Obstacle(Box((10, 10, 10)), Pose.from_position_quaternion((face - 5.0) * n, turn.quaternion))
     return work_of(planar_arm(), tip_body, [wall]), np.array([0.0, q1])
@@ -458,7 +444,7 @@ def test_a_path_that_bends_towards_the_wall_is_not_proven():
 def test_a_pair_that_keeps_its_distance_keeps_all_of_it_within_a_step():
     g = work_of(gantry(), POINT, [Obstacle(Sphere(0.1))])
     # past the ball: 0.05 mm of room at both ends, 0.05 mm less than none in the middle
-    reach = 0.1 + 0.02 + SETTING.distance
+    reach = 0.1 + 0.02 + SAFETY.distance
     x = math.sqrt((reach + 5e-5) ** 2 - (reach - 4e-5) ** 2)
     q, step = np.array([-x, 0.0, reach - 4e-5]), np.array([2 * x, 0.0, 0.0])
     assert worst_room(g, q, step, 1.0) < -3e-5
@@ -565,4 +551,4 @@ def test_later_means_where_the_obstacle_will_be():
         here = slack_at(g, np.zeros(3), seconds, 9.0)
         assert here == pytest.approx(slack_at(later, np.zeros(3), 0.0, 9.0), abs=1e-12)
         assert here == pytest.approx(np.linalg.norm(ball.at(seconds).pose.position) - 0.13, abs=1e-12)
-    assert g[SETTINGS, SELF_MARGIN] == 0.015
+    assert g[ROW.settings, SETTING.self_margin] == 0.015

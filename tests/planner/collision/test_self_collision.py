@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers.random_scenes import SETTINGS, demonstrated, panda, problem, solve
 
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.scene import ARM, FINGERS, compiled_scene
 from onedemo.planner.collision.self_collision import body_pairs
 from onedemo.planner.planning.planner import Planner
@@ -19,7 +20,7 @@ FOLDED = np.array([1.22, 1.17, -2.16, -2.73, 2.41, 0.67, -0.48])
 
 def contacts_with_itself(q):
     """Pairs of geoms of the robot that MuJoCo says touch at joints q (7,)."""
-    scene = compiled_scene("Panda")
+    scene = compiled_scene(ROBOTS["Panda"])
     data = mujoco.MjData(scene.model)
     data.qpos[scene.arms[0].qpos] = q
     data.qpos[scene.arms[0].finger_qpos] = scene.arms[0].finger_open
@@ -29,7 +30,7 @@ def contacts_with_itself(q):
 
 
 def within_gripper(pair):
-    model = compiled_scene("Panda").model
+    model = compiled_scene(ROBOTS["Panda"]).model
     return all("gripper" in model.body(int(body)).name for body in model.geom_bodyid[pair])
 
 

@@ -15,10 +15,10 @@ from helpers.strategies import assert_same_pose, for_all, random_dq, st
 from onedemo.planner.collision.clearance import find_near
 from onedemo.planner.collision.edge_certificates import is_clear, place_tool, point_speeds, slide_is_clear, tool_arrays
 from onedemo.planner.collision.edge_certificates import screw_is_clear as screw_clear
-from onedemo.planner.collision.robot_arrays import W_REACH, WORLD
+from onedemo.planner.collision.robot_arrays import PLACED, ROW
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, OneDemoError
 from onedemo.planner.escape.detour import first_blocked
-from onedemo.planner.escape.escape_tree import AWAY, RANDOM, TREE_WIDTH, VERDICT, WIDEST, expand
+from onedemo.planner.escape.escape_tree import expand
 from onedemo.planner.escape.repet import (
     MAX_OBSTACLES,
     VERDICTS,
@@ -29,6 +29,7 @@ from onedemo.planner.escape.repet import (
     escape_path,
     point_tool,
 )
+from onedemo.planner.escape.tree_arrays import NODE, OPTION
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry import screw
 from onedemo.planner.geometry.pose import Pose, PosePath
@@ -184,7 +185,7 @@ def test_the_bound_of_an_edge_is_no_less_than_the_way_of_any_point(seed):
     tool, x, y = random_tool(rng), Pose(random_dq(rng)), Pose(random_dq(rng))
     work = tool_arrays(tool, pack([]))
     fastest = point_speeds(work, screw.twist_of(screw.mul(screw.conj(tuple_of(x)), tuple_of(y))))
-    bounds = work[WORLD : WORLD + len(tool), W_REACH]
+    bounds = work[ROW.placed : ROW.placed + len(tool), PLACED.reach]
     poses = [Pose(row) for row in dq.sclerp(x.dq, y.dq, np.linspace(0, 1, 400))]
     turns, places = np.array([pose.rotation for pose in poses]), np.array([pose.position for pose in poses])
     inside = tool[:, :3] + rng.uniform(size=(len(tool), 1)) * (tool[:, 3:6] - tool[:, :3])
@@ -243,7 +244,7 @@ def test_a_slide_and_a_screw_without_a_turn_agree():
     for _ in range(200):
         tool, obstacle, x, y = some_edge(rng, False)
         work = tool_arrays(tool, pack([obstacle]), margin=0.01)
-        place_tool(work, tuple_of(x), WORLD)
+        place_tool(work, tuple_of(x), ROW.placed)
         find_near(work, x.distance_to(y)[0] + 0.01)
         slides = bool(slide_is_clear(work, tuple(y.position - x.position)))
         if slides != bool(screw_clear(work, tuple_of(x), tuple_of(y))):
@@ -706,7 +707,7 @@ def test_any_whole_number_is_a_seed(seed):
 def test_first_blocked_is_the_first_edge_that_is_not_clear(kind):
     """Also where one look at the room proves several edges."""
     options = DEFAULTS.packed()
-    options[WIDEST] = DEFAULTS.distance
+    options[OPTION.largest_margin] = DEFAULTS.distance
     for seed in range(3):
         path, tool, obstacles = tool_problem(kind, seed)
         g = tool_arrays(tool, pack(obstacles), margin=DEFAULTS.distance)
@@ -720,12 +721,20 @@ def test_children_far_off_the_plane_are_proven_clear_too():
     plate = Obstacle(Box((2.0, 2.0, 0.002)), Pose.from_position_quaternion([0.0, 0.0, 0.18]))
     ball = Obstacle(Sphere(0.05), Pose.from_position_quaternion([0.0, 0.0, -0.1]))
     g, options = tool_arrays(point_tool(0.005), pack([plate, ball]), margin=0.01), DEFAULTS.packed()
-    options[WIDEST], options[RANDOM], options[AWAY] = 0.01, 40.0, 5.0
-    tree, x = np.zeros((60, TREE_WIDTH)), tuple(Pose.identity().dq.tolist())
+    options[OPTION.largest_margin], options[OPTION.random], options[OPTION.away] = 0.01, 40.0, 5.0
+    tree, x = np.zeros((60, NODE.width)), tuple(Pose.identity().dq.tolist())
     tree[0, 0] = 1.0
     count = expand(
-        g, tree, 0, 1, tuple(at([0.5, 0.0, 0.0]).dq.tolist()), np.full(64, -1.0), options, options[0], np.ones(1)
+        g,
+        tree,
+        0,
+        1,
+        tuple(at([0.5, 0.0, 0.0]).dq.tolist()),
+        np.full(64, -1.0),
+        options,
+        options[OPTION.step],
+        np.ones(1),
     )
-    kept = [row for row in tree[1:count] if row[VERDICT] == KEPT]
+    kept = [row for row in tree[1:count] if row[NODE.verdict] == KEPT]
     assert len(kept) > 10 and count - 1 - len(kept) > 5
     assert all(is_clear(g, x, tuple(row[:8].tolist()), 0.01) for row in kept)

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from onedemo.planner.errors import BadShape, NotFinite, UnfitShape
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import (
-    ROW,
+    OBSTACLE,
     Box,
     Capsule,
     Cylinder,
@@ -157,7 +157,7 @@ def test_rows_hold_what_the_table_says():
         Obstacle(wedge, turn),
     ]
     rows, vertices = pack(obstacles)
-    assert rows.shape == (6, ROW) and ROW == 24
+    assert rows.shape == (6, OBSTACLE.packed) and OBSTACLE.packed == 24
     np.testing.assert_array_equal(rows[:, 0], [0, 1, 4, 2, 3, 4])
     np.testing.assert_array_equal(rows[:, 1], [0.3, 0.1, 0, 0, 0, 0])
     np.testing.assert_array_equal(rows[:, 2:5], np.tile(turn.position, (6, 1)))
@@ -169,7 +169,7 @@ def test_rows_hold_what_the_table_says():
     np.testing.assert_array_equal(rows[:, 21:23], [[0, 0], [0, 0], [0, 8], [0, 0], [0, 0], [8, 4]])
     np.testing.assert_array_equal(rows[:, 23], [-1, 0, -1, 0.07, -1, -1])
     np.testing.assert_array_equal(vertices, np.vstack([CUBE, wedge.vertices]))
-    assert pack([]).rows.shape == (0, ROW) and pack([]).vertices.shape == (1, 3)
+    assert pack([]).rows.shape == (0, OBSTACLE.packed) and pack([]).vertices.shape == (1, 3)
 
 
 @for_all(st.integers(0, 10**6), st.sampled_from(KINDS), max_examples=40)

@@ -14,7 +14,7 @@ import pytest
 from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.errors import BadDemonstration, OneDemoError, UnknownName
 from onedemo.planner.imitation.demonstration import warnings_of
-from onedemo.planner.imitation.demonstration_files import REQUIRED, load_demonstration, save_demonstration
+from onedemo.planner.imitation.demonstration_files import REQUIRED, read_demonstration, save_demonstration
 
 
 def shipped_arrays():
@@ -143,20 +143,20 @@ def test_a_bad_demonstration_is_refused_in_one_line_that_names_file_and_key(name
     path = tmp_path / "bad.npz"
     np.savez(path, **arrays)
     with pytest.raises(BadDemonstration, match=message) as caught:
-        load_demonstration(path)
+        read_demonstration(path)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
 
 @pytest.mark.parametrize("value", [["0", "1"], np.array([0j, 1j]), [None, 1.0]])
 def test_a_demonstration_made_in_code_takes_real_numbers_only(value):
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     with pytest.raises(BadDemonstration, match="stack: time: is not an array of real numbers"):
         dataclasses.replace(demo, time=value)
 
 
 def test_names_need_no_sizes_and_another_robot_may_be_the_teacher():
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     assert dataclasses.replace(demo, object_sizes={}).segments[0].reference == "cubeA"
     six = dataclasses.replace(demo, robot="UR5e", joint_positions=demo.joint_positions[:, :6])
     assert six.robot == "UR5e"
@@ -164,7 +164,7 @@ def test_names_need_no_sizes_and_another_robot_may_be_the_teacher():
 
 
 def test_a_demonstration_that_cannot_be_written_leaves_no_file(tmp_path, monkeypatch):
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
 
     def full(file, **arrays):
         file.write(b"begun")
@@ -222,7 +222,7 @@ def test_a_hostile_file_is_refused_and_never_runs(name, tmp_path, monkeypatch):
     path = tmp_path / "hostile.npz"
     FILES[name](path)
     with pytest.raises(BadDemonstration) as caught:
-        load_demonstration(path)
+        read_demonstration(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "attacked").exists()
@@ -232,7 +232,7 @@ def test_a_hostile_file_is_refused_and_never_runs(name, tmp_path, monkeypatch):
 def test_doubled_members_are_refused(tmp_path):
     zipped(tmp_path / "two.npz", [("time.npy", npy(np.zeros(3))), ("time.npy", npy(np.ones(3)))])
     with pytest.raises(BadDemonstration, match="stands in the file twice"):
-        load_demonstration(tmp_path / "two.npz")
+        read_demonstration(tmp_path / "two.npz")
 
 
 def test_random_damage_is_an_error_of_ours_or_harmless(tmp_path):
@@ -244,7 +244,7 @@ def test_random_damage_is_an_error_of_ours_or_harmless(tmp_path):
             damaged[position] = rng.integers(256)
         path.write_bytes(damaged)
         try:
-            load_demonstration(path)
+            read_demonstration(path)
         except OneDemoError as error:
             refused += 1
             assert "\n" not in str(error)
@@ -252,9 +252,9 @@ def test_random_damage_is_an_error_of_ours_or_harmless(tmp_path):
 
 
 def test_saving_and_loading_keeps_everything(tmp_path):
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     save_demonstration(demo, tmp_path / "again.npz")
-    again = load_demonstration(tmp_path / "again.npz")
+    again = read_demonstration(tmp_path / "again.npz")
     for key in ("name", "task", "robot", "tcp_frame", "source", "licence"):
         assert getattr(again, key) == getattr(demo, key)
     for key in ("time", "joint_positions", "gripper"):
@@ -277,18 +277,18 @@ def test_rounded_quaternions_are_accepted_and_made_unit(tmp_path):
     arrays = shipped_arrays()
     arrays["poses"] = arrays["poses"].astype(np.float32).round(4)
     np.savez(tmp_path / "rounded.npz", **arrays)
-    quaternions = load_demonstration(tmp_path / "rounded.npz").path.quaternions
+    quaternions = read_demonstration(tmp_path / "rounded.npz").path.quaternions
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1, atol=1e-14)
 
 
 def test_segments_are_found_by_name():
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     assert len(demo.segment_path("approach")) == demo.segment("approach").stop + 1
     with pytest.raises(UnknownName, match="known: approach, transfer"):
         demo.segment("pour")
 
 
 def test_warnings_tell_of_pauses_and_tilt():
-    text = "\n".join(warnings_of(load_demonstration(shipped_demonstration("stack"))))
+    text = "\n".join(warnings_of(read_demonstration(shipped_demonstration("stack"))))
     assert "pause of 0.9 s" in text
     assert "tilted" in text

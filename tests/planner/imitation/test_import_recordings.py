@@ -9,10 +9,11 @@ from helpers.strategies import assert_same_pose, random_path
 
 from onedemo.bench.cli import main
 from onedemo.configs.shipped_files import shipped_demonstration
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.scene import robot_arm
 from onedemo.planner.errors import BadDemonstration, OneDemoError
 from onedemo.planner.geometry.pose import Pose, PosePath
-from onedemo.planner.imitation.demonstration_files import load_demonstration
+from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.import_recordings import from_pose_table, stack_from_teleoperation
 from onedemo.planner.imitation.segmentation import dwells, gripper_events, resampled, trimmed
 from onedemo.planner.imitation.tsia import screw_path
@@ -82,16 +83,16 @@ def at(array, index, value):
 def test_bad_teleoperations_are_named_with_file_and_index(key, change, message, tmp_path):
     path, arrays = tmp_path / "raw.npz", teleoperation()
     np.savez(path, **arrays)
-    assert len(stack_from_teleoperation(path, robot_arm("Panda"), name="x", licence="y").segments) == 2
+    assert len(stack_from_teleoperation(path, robot_arm(ROBOTS["Panda"]), name="x", licence="y").segments) == 2
     np.savez(path, **{**arrays, key: change(arrays[key])})
     with pytest.raises(BadDemonstration, match=message) as caught:
-        stack_from_teleoperation(path, robot_arm("Panda"), name="x", licence="y")
+        stack_from_teleoperation(path, robot_arm(ROBOTS["Panda"]), name="x", licence="y")
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
 
 
 def test_the_recorded_joints_give_the_recorded_path():
-    demo, arm = load_demonstration(shipped_demonstration("stack")), robot_arm("Panda")
+    demo, arm = read_demonstration(shipped_demonstration("stack")), robot_arm(ROBOTS["Panda"])
     for k in range(0, len(demo.path), 25):
         distance, angle = arm.fk(demo.joint_positions[k]).distance_to(demo.path[k])
         assert distance < 1e-9
@@ -99,7 +100,7 @@ def test_the_recorded_joints_give_the_recorded_path():
 
 
 def test_the_recorded_hand_is_at_the_cube_when_it_closes():
-    demo = load_demonstration(shipped_demonstration("stack"))
+    demo = read_demonstration(shipped_demonstration("stack"))
     approach = demo.segment("approach")
     offset = approach.reference_pose.position - demo.path[approach.stop].position
     assert np.linalg.norm(offset) < 0.02

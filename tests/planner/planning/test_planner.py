@@ -31,11 +31,13 @@ from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Capsule, Obstacle, Sphere
 from onedemo.planner.imitation.tsia import guide_index, screw_path
 from onedemo.planner.judge.certify import ANGLE_ERROR, POSITION_ERROR, certify
+from onedemo.planner.planning.batch import plan_batch
 from onedemo.planner.planning.joint_space_motion import RAMP, NextMotionCheck, path_deviation, timed_on_lines
 from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
-from onedemo.planner.planning.plan import NextMotion, Plan, Problem
-from onedemo.planner.planning.planner import Planner, plan, plan_batch
+from onedemo.planner.planning.plan import NextMotion, Plan, PlanRequest
+from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
+from onedemo.planner.planning.refine import scene_of
 from onedemo.planner.planning.settings import JointSearchSettings, PlanSettings
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body
@@ -177,20 +179,20 @@ def test_the_same_seed_gives_the_same_bits(kind):
 def test_a_batch_is_the_same_as_one_by_one():
     arm, body, _ = panda()
     scenes = [problem(kind, seed) for kind in ("convex", "clutter", "gap", "trap") for seed in (3, 4, 5)]
-    legs = [Problem(demonstrated(), s.start, s.goal, s.obstacles, s.seed) for s in scenes]
+    requests = [PlanRequest(demonstrated(), s.start, s.goal, s.obstacles, seed=s.seed) for s in scenes]
     alone = [solve(scene) for scene in scenes]
     for workers in (1, 2, 5):
-        together = plan_batch(legs, arm, body, workers=workers)
+        together = plan_batch(requests, arm, body, workers=workers)
         assert all(same_plan(a, b) for a, b in zip(alone, together, strict=True))
     assert plan_batch([], arm, body) == []
     with pytest.raises(BadOption, match="workers"):
-        plan_batch(legs, arm, body, workers=0)
+        plan_batch(requests, arm, body, workers=0)
 
 
 def test_the_function_is_the_planner():
     arm, body, _ = panda()
     scene = problem("convex", 7)
-    one = plan(demonstrated(), scene.start, scene.goal, scene.obstacles, arm, body, seed=7)
+    one = Planner(arm, body).plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=7)
     assert same_plan(one, solve(scene))
 
 
@@ -634,11 +636,11 @@ def test_a_leg_that_must_go_on_ends_where_it_can():
             continue
         lifted = screw_path(scene.goal, at([0.0, 0.0, 0.04]) @ scene.goal, 0.01)
         planner = Planner(arm, body, SETTINGS)
-        after = NextMotionCheck(plain.request.scene, lifted, must=True)
+        after = NextMotionCheck(scene_of(plain), lifted, required=True)
         if after.is_feasible(arm, planner._work, plain.joints[-1], SETTINGS):
             continue
         tried += 1
-        next_motion = NextMotion(lifted, must=True)
+        next_motion = NextMotion(lifted, required=True)
         found = planner.plan(
             demonstrated(), scene.start, scene.goal, scene.obstacles, seed=seed, next_motion=next_motion
         )

@@ -59,7 +59,7 @@ def posture(arm: Arm, pose: Pose, rng: np.random.Generator) -> np.ndarray:
     return max((q for q in found if q is not None), key=arm.margin)
 
 
-def leg(name: str, seed: int):
+def problem_of(name: str, seed: int):
     """Start, goal and up to two obstacles near the way; ends and some goal posture are clear."""
     arm, body, _ = panda()
     path, rng = motion(name), np.random.default_rng([MOTIONS.index(name), seed])
@@ -83,7 +83,7 @@ def solved_of(name: str, seeds: range) -> int:
     arm, body, _ = panda()
     planner, solved = Planner(arm, body), 0
     for seed in seeds:
-        start, goal, obstacles = leg(name, seed)
+        start, goal, obstacles = problem_of(name, seed)
         found = planner.plan(motion(name), start, goal, obstacles, seed=seed)
         if found.success:
             certificate = certify(log_of(found, arm, body, goal, obstacles))
@@ -128,7 +128,7 @@ def test_signs_repeats_and_a_trembling_hand_change_little(name, tmp_path):
     demo = from_pose_table(tmp_path / "spoilt.npy", name=name, robot="Panda", rate=50.0, units="cm")
     path = resampled(demo.path.moved(world_from_base()), 0.005)
     arm, body, _ = panda()
-    start, goal, obstacles = leg(name, 0)
+    start, goal, obstacles = problem_of(name, 0)
     found = Planner(arm, body).plan(path, start, goal, obstacles)
     assert found.success
     assert certify(log_of(found, arm, body, goal, obstacles)).ok
@@ -139,7 +139,7 @@ def test_a_recording_is_planned_as_it_is_too(name):
     """All of its samples, not resampled."""
     demo = from_pose_table(table(name), name=name, robot="Panda", rate=50.0, units="cm")
     arm, body, _ = panda()
-    start, goal, _ = leg(name, 0)
+    start, goal, _ = problem_of(name, 0)
     found = Planner(arm, body).plan(demo.path.moved(world_from_base()), start, goal)
     assert found.success
     assert certify(log_of(found, arm, body, goal, ())).ok

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.collision.edge_certificates import tool_arrays
@@ -16,14 +17,21 @@ from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.log.motion_log import MotionLog
 from onedemo.planner.planning.planner import Planner
-from onedemo.planner.planning.refine import retimed, smooth_clear_path
+from onedemo.planner.planning.refine import (
+    check_joints_are_clear,
+    refused,
+    scene_of,
+    smooth_clear_path,
+    smoothed,
+    timed,
+)
 
 START = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
 
 
 def planned(obstacles):
-    scene = compiled_scene("Panda")
-    arm, body = scene.arms[0].arm, robot_body("Panda")
+    scene = compiled_scene(ROBOTS["Panda"])
+    arm, body = scene.arms[0].arm, robot_body(ROBOTS["Panda"])
     start = arm.fk(START)
     goal = Pose.from_position_quaternion([0.0, 0.35, 0.0]) @ start
     return arm, body, Planner(arm, body).plan(screw_path(start, goal, 0.01), START, goal, obstacles)
@@ -56,56 +64,56 @@ def bends(path):
 
 @pytest.mark.parametrize("things", [0, 1])
 def test_a_timed_plan_keeps_limits_ends_and_distance(things):
-    ball = [ball_between(compiled_scene("Panda").arms[0].arm)][:things]
+    ball = [ball_between(compiled_scene(ROBOTS["Panda"]).arms[0].arm)][:things]
     arm, body, plan = planned(ball)
     assert plan.success and plan.how == ("escape" if things else "direct")
-    timed = plan.timed(3.0)
-    assert timed.success and timed.refined == ("timed",) and timed.changed == 0
-    np.testing.assert_allclose(timed.joints[[0, -1]], plan.joints[[0, -1]], atol=1e-9)
-    speeds = np.diff(timed.joints, axis=0) / plan.dt
+    fast = timed(plan, 3.0)
+    assert fast.success and fast.refined == ("timed",) and fast.changed == 0
+    np.testing.assert_allclose(fast.joints[[0, -1]], plan.joints[[0, -1]], atol=1e-9)
+    speeds = np.diff(fast.joints, axis=0) / plan.dt
     assert (np.abs(speeds) <= arm.velocity_limits + 1e-6).all()
     assert np.abs(np.diff(speeds, axis=0) / plan.dt).max() <= 3.0 + 1e-3
     assert np.abs(speeds[[0, -1]]).max() < 3.0 * plan.dt
-    assert len(plan.timed(1.0).joints) > len(timed.joints)
-    assert judged(timed, arm, body, ball).ok
+    assert len(timed(plan, 1.0).joints) > len(fast.joints)
+    assert judged(fast, arm, body, ball).ok
 
 
 @pytest.mark.parametrize("things", [0, 1])
 def test_a_smooth_plan_bends_less_and_is_clear(things):
-    ball = [ball_between(compiled_scene("Panda").arms[0].arm)][:things]
+    ball = [ball_between(compiled_scene(ROBOTS["Panda"]).arms[0].arm)][:things]
     arm, body, plan = planned(ball)
-    smooth = plan.smoothed()
+    smooth = smoothed(plan)
     assert smooth.success and smooth.refined == ("smooth",)
     assert judged(smooth, arm, body, ball).ok
     np.testing.assert_array_equal(smooth.joints[0], plan.joints[0])
     assert smooth.path[-1].distance_to(plan.request.goal)[0] < 1e-12
     if things:
         assert bends(smooth.path.positions).max() < 0.5 * bends(plan.path.positions).max()
-    both = smooth.timed()
+    both = timed(smooth)
     assert both.refined == ("smooth", "timed") and judged(both, arm, body, ball).ok
 
 
 def test_what_the_spline_or_the_curve_runs_into_is_refused():
     arm, _, plan = planned([])
     wall = (Obstacle(Box((1.0, 0.01, 1.0)), Pose.from_position_quaternion(between(arm, 0.9)), name="wall"),)
-    walled = plan._replace(asked=plan.request._replace(obstacles=wall))
+    walled = plan._replace(request=plan.request._replace(obstacles=wall))
     with pytest.raises(PlanFailed, match=r"not clear at \d"):
-        walled.timed()
+        timed(walled)
     with pytest.raises(PlanFailed, match="not clear behind pose"):
-        walled.smoothed()
+        smoothed(walled)
     with pytest.raises(PlanFailed, match=r"not clear at \d"):
-        retimed(plan.joints, plan.dt, 5.0, arm, walled.request.scene)
-    refused = plan.refused(PlanFailed("plan_failed", "so"))
-    assert not refused.success and refused.why == "plan_failed: so" and len(refused.joints) == 1
+        check_joints_are_clear(plan.joints, plan.dt * np.arange(len(plan.joints)), scene_of(walled))
+    failed = refused(plan, PlanFailed("plan_failed", "so"))
+    assert not failed.success and failed.why == "plan_failed: so" and len(failed.joints) == 1
 
 
 def test_without_a_plan_there_is_nothing_to_refine():
-    arm = compiled_scene("Panda").arms[0].arm
+    arm = compiled_scene(ROBOTS["Panda"]).arms[0].arm
     goal = arm.fk(START).position + np.array([0.0, 0.35, 0.0])
     plan = planned([Obstacle(Sphere(0.1), Pose.from_position_quaternion(goal), name="ball")])[2]
-    for refine in (plan.timed, plan.smoothed):
+    for refine in (timed, smoothed):
         with pytest.raises(PlanFailed, match=r"goal in collision: .* touches ball"):
-            refine()
+            refine(plan)
 
 
 def test_a_way_through_joint_space_is_not_made_smooth_but_timed():
@@ -114,9 +122,8 @@ def test_a_way_through_joint_space_is_not_made_smooth_but_timed():
     plan = solve(problem("gap", 0))
     assert plan.how == "joint search"
     with pytest.raises(PlanFailed, match="joint space"):
-        plan.smoothed()
-    timed = plan.timed()
-    assert judged(timed, *panda()[:2], problem("gap", 0).obstacles).ok
+        smoothed(plan)
+    assert judged(timed(plan), *panda()[:2], problem("gap", 0).obstacles).ok
 
 
 def test_a_detour_is_made_smooth_and_stays_clear():

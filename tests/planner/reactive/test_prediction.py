@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.random_scenes import at, base_gap
 
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.collision.clearance import slack_at
@@ -32,10 +33,10 @@ SHOULDER = 0.3
 
 
 def robot():
-    return compiled_scene("Panda").arms[0].arm, robot_body("Panda")
+    return compiled_scene(ROBOTS["Panda"]).arms[0].arm, robot_body(ROBOTS["Panda"])
 
 
-def leg():
+def sideways():
     start = robot()[0].fk(START)
     return screw_path(start, at([0.0, 0.35, 0.0]) @ start, 0.005)
 
@@ -43,7 +44,7 @@ def leg():
 def crossing(seed: int, speed: float) -> Obstacle:
     """Something that crosses the path about when the arm does, from anywhere, and not through the shoulder."""
     arm, body = robot()
-    rng, path = np.random.default_rng([7, seed]), leg()
+    rng, path = np.random.default_rng([7, seed]), sideways()
     while True:
         place = path[int(len(path) * rng.uniform(0.3, 0.7))].position
         angle = rng.uniform(-np.pi, np.pi)
@@ -61,7 +62,7 @@ def crossing(seed: int, speed: float) -> Obstacle:
 def followed(world, settings=None, ticks=1500):
     """The commands, and the joints of every tick, of the leg in a world that is a function of the tick."""
     planner = ReactivePlanner(*robot(), settings)
-    planner.go(leg())
+    planner.go(sideways())
     q, commands, trace = START.copy(), [], [START]
     for k in range(ticks):
         planner.see(world(k))
@@ -82,7 +83,7 @@ def judged_clearance(trace, obstacle) -> float:
 
 
 def arrives(trace) -> bool:
-    distance, angle = robot()[0].fk(trace[-1]).distance_to(leg()[-1])
+    distance, angle = robot()[0].fk(trace[-1]).distance_to(sideways()[-1])
     return distance < 2e-3 and angle < 0.02
 
 
@@ -136,7 +137,7 @@ def test_what_appears_and_moves_is_not_touched_and_the_goal_is_reached():
 
 
 def test_what_parks_on_the_goal_fails_and_is_named():
-    goal, seconds = leg()[-1].position, 1.0
+    goal, seconds = sideways()[-1].position, 1.0
     way = np.array([0.2, 0.0, 0.1])
 
     def world(k):
@@ -155,7 +156,7 @@ def test_what_parks_on_the_goal_fails_and_is_named():
 def test_a_slow_thing_is_gone_round_while_it_moves():
     """It would take seconds to be gone; the way round takes less."""
     way = np.array([0.0, 0.0, -0.05])
-    thing = Obstacle(Sphere(0.03), at(leg()[35].position + np.array([0.0, 0.0, 0.05])), way, "slow")
+    thing = Obstacle(Sphere(0.03), at(sideways()[35].position + np.array([0.0, 0.0, 0.05])), way, "slow")
     commands, trace = followed(lambda k: (thing.at(DT * k),))
     _, blind = followed(lambda k: (thing.at(DT * k),), ReactiveSettings(horizon=0.0))
     assert commands[-1].state == DONE and ESCAPING in [command.state for command in commands]
@@ -166,7 +167,7 @@ def test_a_slow_thing_is_gone_round_while_it_moves():
 def test_waiting_is_standing_still_because_of_what_moves():
     """Something long closes the way and opens it again."""
     way, seen = np.array([0.0, 0.0, -0.3]), 0
-    middle = leg()[len(leg()) // 2].position
+    middle = sideways()[len(sideways()) // 2].position
     bar = Obstacle(Box((0.3, 0.04, 0.2)), at(middle + np.array([0.0, 0.06, 0.5])), way, "bar")
     commands, trace = followed(lambda k: (bar.at(DT * k),))
     arm, body = robot()
@@ -193,16 +194,16 @@ def test_what_is_foreseen_comes_true():
     scene = PlanningScene.of(arm, body, [thing], settings.plan)
     safe_velocity(scene.robot, START, np.zeros(7), DT, np.empty(7))
     before, memory = scene.robot.copy(), fresh_pursuit_state()
-    ahead = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, leg(), memory, START)
+    ahead = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, sideways(), memory, START)
     assert ahead.arrival == pytest.approx(DT * (len(commands) - 1), abs=1e-9)
     rooms = [command.slack for command in commands]
     assert ahead.slack == pytest.approx(min(rooms), abs=1e-6)
     # looking changes nothing
     np.testing.assert_array_equal(scene.robot, before)
     np.testing.assert_array_equal(memory, fresh_pursuit_state())
-    short = Predictor(work, DT, 0.5, 0.15).ahead(scene.robot, leg(), memory, START)
+    short = Predictor(work, DT, 0.5, 0.15).ahead(scene.robot, sideways(), memory, START)
     assert 0.5 < short.arrival < ahead.arrival + 1.0
-    later = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, leg(), memory, START, wait=5.0)
+    later = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, sideways(), memory, START, wait=5.0)
     assert later.arrival > 5.0
 
 

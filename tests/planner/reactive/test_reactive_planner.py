@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.collision.clearance import slack_at
@@ -33,7 +34,7 @@ START = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
 
 
 def robot():
-    return compiled_scene("Panda").arms[0].arm, robot_body("Panda")
+    return compiled_scene(ROBOTS["Panda"]).arms[0].arm, robot_body(ROBOTS["Panda"])
 
 
 def sideways(way=0.35):
@@ -157,7 +158,7 @@ def test_a_goal_behind_walls_fails_with_a_reason_and_touches_nothing():
             walls.append(Obstacle(Box(tuple(size)), Pose.from_position_quaternion(place), name=f"wall{axis}{side:+g}"))
     settings = ReactiveSettings(patience=0.4, give_up=5.0)
     states, rooms, _, planner = followed(path, lambda k: tuple(walls), settings=settings)
-    assert states[-1] == FAILED and planner.reason in ("blocked", "ik_or_limit")
+    assert states[-1] == FAILED and planner.motion.reason in ("blocked", "ik_or_limit")
     assert rooms[rooms < 1.0].min() >= min(rooms[0], 0.0) - 1e-9
 
 
@@ -220,7 +221,7 @@ def test_without_detours_nothing_is_led_round_and_the_tool_stays_on_its_path():
     free_states, _, free, _ = followed(path, lambda k: things)
     assert free_states[-1] == DONE and path_deviation(arm, free, path.dqs) > 3 * MAX_DEVIATION
     states, rooms, trace, planner = followed(path, lambda k: things, detours=False)
-    assert states[-1] == FAILED and planner.reason == "blocked" and "ball" in planner.detail
+    assert states[-1] == FAILED and planner.motion.reason == "blocked" and "ball" in planner.motion.detail
     assert ESCAPING not in states and rooms.min() >= -1e-9
     # a tick past the limit is what it takes to see that it is passed
     assert path_deviation(arm, trace, path.dqs) < MAX_DEVIATION + 0.001
@@ -237,5 +238,5 @@ def test_what_stands_still_at_the_goal_is_given_up_at_the_first_stall():
     path = sideways()
     things = (ball(path[-1].position),)
     states, rooms, _, planner = followed(path, lambda k: things, ticks=3000)
-    assert states[-1] == FAILED and planner.reason == "blocked" and rooms.min() >= -1e-9
+    assert states[-1] == FAILED and planner.motion.reason == "blocked" and rooms.min() >= -1e-9
     assert len(states) * DT < 10.0

@@ -12,6 +12,7 @@ from helpers.arms import panda, panda_urdf
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from onedemo.envs import ROBOTS
 from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.errors import BadModel, BadShape, NotFinite, OneDemoError, UnfitShape, UnknownName
 from onedemo.planner.geometry.capsule_cover import covering_capsules, fitted_capsules, strips
@@ -166,7 +167,7 @@ def test_points_that_make_no_hull_are_refused():
 
 @cache
 def robot() -> tuple[mujoco.MjModel, Arm, Body]:
-    scene = compiled_scene("Panda")
+    scene = compiled_scene(ROBOTS["Panda"])
     arm = scene.arms[0].arm
     return scene.model, arm, body_from_mujoco(scene.model, arm, arm.joint_names)
 

@@ -8,17 +8,7 @@ from helpers.strategies import for_all
 from hypothesis import reject
 from hypothesis import strategies as st
 
-from onedemo.planner.safety.qp import (
-    ACTIVE,
-    BOUND,
-    MOST_ACTIVE,
-    MULTIPLIER,
-    SLACK,
-    SOFTNESS,
-    WIDTH,
-    inverse_weight,
-    solve,
-)
+from onedemo.planner.safety.qp import MOST_ACTIVE, QP, SLACK, inverse_weight, solve
 
 seeds = st.integers(0, 10**6)
 
@@ -29,11 +19,11 @@ def solved(start, weight, rows, bounds, soft=()):
     inverse = np.zeros((16, 40))
     inverse[:n, :n] = weight
     inverse_weight(inverse, n)
-    work = np.zeros((max(1, len(rows)), WIDTH))
+    work = np.zeros((max(1, len(rows)), QP.width))
     for row, a, b in zip(work, rows, bounds, strict=False):
-        row[:n], row[BOUND] = a, b
+        row[:n], row[QP.bound] = a, b
     for k in soft:
-        work[k, SOFTNESS] = SLACK
+        work[k, QP.softness] = SLACK
     ok = solve(x, inverse, work, len(rows), np.zeros(MOST_ACTIVE), np.zeros((MOST_ACTIVE + 1, MOST_ACTIVE)), n)
     return x, ok, work
 
@@ -82,13 +72,13 @@ def test_the_solution_satisfies_the_conditions_of_optimality(seed):
     if not ok:  # rows nearly parallel and opposite that both touch: a contradiction up to rounding
         assert (rows @ x - bounds).min() > -1e-6
         reject()
-    multipliers = work[:, MULTIPLIER]
+    multipliers = work[:, QP.multiplier]
     assert multipliers.min() >= -1e-9
     pull = rows.T @ multipliers
     np.testing.assert_allclose(weight @ (x - start), pull, rtol=0, atol=1e-8 * (1 + np.abs(pull).max()))
     idle = rows @ x - bounds > 1e-7
     assert not multipliers[idle].any()
-    assert ((work[:, ACTIVE] == 1.0) >= (multipliers > 0)).all()
+    assert ((work[:, QP.active] == 1.0) >= (multipliers > 0)).all()
 
 
 @for_all(seeds, max_examples=100)
@@ -98,7 +88,7 @@ def test_soft_rows_are_solved_as_with_slacks_of_their_own(seed):
     start, weight, rows, bounds = problem(seed, feasible=False)
     n, m = len(start), len(rows)
     x, ok, work = solved(start, weight, rows, bounds, range(m))
-    slack = SLACK * work[:, MULTIPLIER]
+    slack = SLACK * work[:, QP.multiplier]
     assert ok and (rows @ x + slack - bounds).min() >= -1e-6 * (1.0 + np.abs(x).max())
     whole = np.block([[weight, np.zeros((n, m))], [np.zeros((m, n)), np.eye(m) / SLACK]])
     linear = np.concatenate([weight @ start, np.zeros(m)])
@@ -115,13 +105,13 @@ def test_contradicting_soft_rows_give_way_evenly_and_say_by_how_much():
     x, ok, work = solved([0.3, 5.0], np.eye(2), [[1, 0], [-1, 0]], [1.0, 1.0], soft=(0, 1))
     assert ok
     np.testing.assert_allclose(x, [0.0, 5.0], rtol=0, atol=1e-6)
-    np.testing.assert_allclose(SLACK * work[:, MULTIPLIER], [1.0, 1.0], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(SLACK * work[:, QP.multiplier], [1.0, 1.0], rtol=0, atol=1e-6)
 
 
 def test_a_soft_row_gives_way_to_hard_ones():
     x, ok, work = solved([0.0], np.eye(1), [[1.0], [-1.0]], [1.0, -0.25], soft=(0,))
     assert ok and x[0] == pytest.approx(0.25, abs=1e-9)
-    assert SLACK * work[0, MULTIPLIER] == pytest.approx(0.75, abs=1e-6)
+    assert SLACK * work[0, QP.multiplier] == pytest.approx(0.75, abs=1e-6)
 
 
 def test_contradicting_hard_rows_are_reported():
@@ -148,7 +138,7 @@ def test_what_keeps_all_bounds_is_left_as_it_is_to_the_bit(seed):
     bounds = np.minimum(bounds, rows @ start)
     x, ok, work = solved(start, weight, rows, bounds, range(0, len(rows), 2))
     assert ok and x.tobytes() == start.tobytes()
-    assert not work[:, MULTIPLIER].any() and not work[:, ACTIVE].any()
+    assert not work[:, QP.multiplier].any() and not work[:, QP.active].any()
 
 
 def test_no_bounds_at_all():
@@ -159,7 +149,7 @@ def test_a_row_of_zeros_is_harmless_where_it_holds_and_reported_where_it_cannot(
     assert solved([1.0], np.eye(1), [[0.0]], [-1.0])[1]
     assert not solved([1.0], np.eye(1), [[0.0]], [1.0])[1]
     x, ok, work = solved([1.0], np.eye(1), [[0.0]], [0.5], soft=(0,))
-    assert ok and x[0] == 1.0 and SLACK * work[0, MULTIPLIER] == pytest.approx(0.5)
+    assert ok and x[0] == 1.0 and SLACK * work[0, QP.multiplier] == pytest.approx(0.5)
 
 
 def test_a_box_is_kept_whatever_else_is_asked():

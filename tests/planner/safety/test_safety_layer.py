@@ -33,6 +33,7 @@ from soak import (
 
 from onedemo.planner import jit
 from onedemo.planner.collision.clearance import slack_at
+from onedemo.planner.collision.robot_arrays import HEADER, NEAR_PAIR, ROW
 from onedemo.planner.errors import BadOption, BadShape, UnknownName
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
@@ -116,8 +117,9 @@ def test_one_bound_is_kept_by_the_closed_form(seed, kind):
     layer = point_among([obstacle])
     q, u = rng.normal(size=3) * 0.15, rng.normal(size=3) * 0.3
     layer(q, np.zeros(3))
-    rows = layer.work[int(layer.work[0, 7]) :]
-    gap, n, setting = rows[0, 3], rows[0, 5:8].copy(), layer.settings
+    rows = layer.work[int(layer.work[ROW.header, HEADER.first_near]) :]
+    gap, setting = rows[0, NEAR_PAIR.distance], layer.settings
+    n = rows[0, NEAR_PAIR.normal : NEAR_PAIR.t].copy()
     result = layer(q, u)
     if result.status in (FREE, CHANGED) and result.slack > 0 and gap > 1e-6:
         short = max(0.0, -setting.alpha * (gap - 0.01 - setting.buffer) + n @ obstacle.velocity - n @ u)

@@ -1,0 +1,1 @@
+"""`onedemo curves`: several trainings in one figure."""

@@ -1,0 +1,32 @@
+"""Errors of environments: unusable actions, obstacles that do not fit, unavailable rendering."""
+
+from __future__ import annotations
+
+from ..planner.errors import BadOption, OneDemoError
+
+
+class NoRoom(BadOption):
+    """None of the drawn starts has enough clearance for the obstacles."""
+
+    def __init__(self, kind: object):
+        self.kind = kind
+        super().__init__("obstacles", f"no room for {kind!r} obstacles beside this start")
+
+
+class BadAction(OneDemoError, ValueError):
+    """An action has the wrong shape or is not finite."""
+
+    def __init__(self, reason: str):
+        self.reason = reason
+        super().__init__(f"action: {reason}")
+
+
+class RenderingUnavailable(OneDemoError, RuntimeError):
+    """No OpenGL library can draw without a display."""
+
+    def __init__(self, detail: str):
+        self.detail = detail
+        super().__init__(
+            f"no picture can be drawn ({detail}); install one of: apt install libegl1 libegl-mesa0 "
+            "libgl1-mesa-dri, or apt install libosmesa6"
+        )

@@ -1,0 +1,121 @@
+"""State of one motion that is being followed: its mode, its path, and how far it has come.
+
+| mode | the arm | entered | left |
+|---|---|---|---|
+| PURSUING | follows the motion's path | by `go`; by a plan without a detour | to any other mode |
+| DETOURING | follows a detour of it | by a plan with a detour, also past what moves | to any other mode |
+| TRACKING | follows joints found by a search | by a plan through joint space | to any other mode |
+| DONE | stands at the end | at the end of the path or of the joints | by `go` or `stop` |
+| FAILED | stands where it is | without progress for too long | by `go` or `stop` |
+
+Waiting for something that moves to pass is part of PURSUING and DETOURING: see `waiting`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from ..control.pursuit import fresh_pursuit_state
+from ..geometry.pose import PosePath
+from ..planning.plan import NextMotion
+from .command import DONE, ESCAPING, FAILED, FOLLOWING
+
+
+class Mode(Enum):
+    """Mode of a motion; the value is the state that its commands report."""
+
+    PURSUING = FOLLOWING
+    DETOURING = ESCAPING
+    TRACKING = "tracking"
+    DONE = DONE
+    FAILED = FAILED
+
+
+@dataclass(slots=True, eq=False)
+class MotionState:
+    """One motion, from `go` to `stop`.
+
+    Attributes:
+        nominal: the path that was asked for.
+        detours: False: along the path or not at all.
+        next_motion: the motion that follows, if it is known.
+        plan_now: the next tick plans round what stands still.
+        mode: see the module.
+        path: the path that is followed: (a part of) the nominal one, or a detour.
+        pursuit: (4,) state of the pursuit along `path`; see `planner.control.pursuit`.
+        joints: (t, dof) that are tracked; None: none.
+        tracked: index of the next row of `joints`.
+        reached: index of the nominal pose from which on the rest was last planned.
+        tries: number of times that a stall led to a new plan.
+        stalled: seconds of all stalls before the current one.
+        refusal: reason and detail of the last plan; "" if it succeeded.
+        reason: why the motion failed; "".
+        detail: the facts of the failure; "".
+        line: (n, 8) path from the start's pose on, which the tool must not leave; None: not needed yet.
+        waiting: the arm stands until something that moves has passed.
+        decision_left: seconds until going on, waiting and detours are compared again.
+    """
+
+    nominal: PosePath
+    detours: bool = True
+    next_motion: NextMotion | None = None
+    plan_now: bool = False
+    mode: Mode = Mode.PURSUING
+    path: PosePath = field(init=False)
+    pursuit: np.ndarray = field(default_factory=fresh_pursuit_state)
+    joints: np.ndarray | None = None
+    tracked: int = 0
+    reached: int = 0
+    tries: int = 0
+    stalled: float = 0.0
+    refusal: tuple[str, str] = ("", "")
+    reason: str = ""
+    detail: str = ""
+    line: np.ndarray | None = None
+    waiting: bool = False
+    decision_left: float = 0.0
+
+    def __post_init__(self):
+        self.path = self.nominal
+
+    @property
+    def over(self) -> bool:
+        """True if the motion is done or has failed."""
+        return self.mode in (Mode.DONE, Mode.FAILED)
+
+    def pursue(self, path: PosePath, *, detour: bool) -> None:
+        """Follow a path from its beginning.
+
+        Args:
+            path: of the tcp.
+            detour: it is a detour, not a part of the nominal path.
+        """
+        self.mode = Mode.DETOURING if detour else Mode.PURSUING
+        self.joints = None
+        self._begin(path)
+
+    def track(self, joints: np.ndarray, path: PosePath) -> None:
+        """Follow joints from their beginning.
+
+        Args:
+            joints: (t, dof) at every tick.
+            path: the path that they lead to.
+        """
+        self.mode, self.joints, self.tracked = Mode.TRACKING, joints, 0
+        self._begin(path)
+
+    def _begin(self, path: PosePath) -> None:
+        self.path, self.pursuit = path, fresh_pursuit_state()
+        self.waiting, self.decision_left = False, 0.0
+
+    def fail(self, reason: str, detail: str) -> None:
+        """End the motion without success.
+
+        Args:
+            reason: the kind of failure.
+            detail: its facts.
+        """
+        self.mode, self.reason, self.detail = Mode.FAILED, reason, detail
