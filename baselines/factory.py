@@ -31,7 +31,7 @@ from .policy import Policy
 from .program_policy import ProgramPolicy
 from .screw_policy import ScrewPolicy, ScrewSettings
 
-OWN_TOOL = "moves the hand itself: only the legs of shipped policies can be moved in another frame of the hand"
+OWN_TOOL = "moves the hand itself: only shipped policies can plan in another frame of the hand"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class PolicyKind:
         settings: their dataclass.
         make: its constructor, given task, demonstration, settings and perhaps another frame of the hand.
         preset: settings that the name stands for.
-        join: how it reads the way between key poses that are far apart.
+        join: how it interpolates between key poses that are far apart.
     """
 
     settings: type

@@ -26,11 +26,11 @@ def ended(work: Callable[[], list[str]], folder: Path, kept: str, *, quiet: bool
     try:
         lines = work()
     except KeyboardInterrupt:
-        console(stderr=True, quiet=quiet).print(f"stopped; {kept} are kept in {folder}, the same command goes on")
+        console(stderr=True, quiet=quiet).print(f"stopped; {kept} are kept in {folder}, the same command continues")
         return INTERRUPTED
     except OSError as error:
         reason = error.strerror or type(error).__name__
-        text = f"{folder}: {reason}; {kept} are kept, the same command goes on"
+        text = f"{folder}: {reason}; {kept} are kept, the same command continues"
         console(stderr=True).print(labeled("error", "red", text))
         return DISK_FULL
     out = console(quiet=quiet)

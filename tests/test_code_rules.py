@@ -107,3 +107,12 @@ def test_first_lines_are_sentences(path):
         first = (ast.get_docstring(node) or "").partition("\n")[0]
         assert not re.match(r"(What|That|Whose|Which|Who|It|The same|How|Of|Whether) ", first), first
         assert not [tic for tic in OLD_TICS if tic in first], first
+
+
+def test_a_class_name_stands_for_one_thing():
+    places = {}
+    for path in SOURCES:
+        for node in tree_of(path).body:
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    assert not {name: files for name, files in places.items() if len(files) > 1}

@@ -35,7 +35,7 @@ RENEWED = 0.1
 """Time [s] between two paths while obstacles move."""
 
 
-class _Task(NamedTuple):
+class _Generation(NamedTuple):
     """The arguments of a path generator for one motion: demonstrated path, goal, index of the guiding pose."""
 
     demonstrated: PosePath
@@ -55,7 +55,7 @@ class GeneratedFollower(ReactivePlanner):
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, generator: PathGenerator):
         self._generator = generator
-        self._task: _Task | None = None
+        self._task: _Generation | None = None
         self._generated: GeneratedPath | None = None
         self._outdated, self._age = False, 0.0
         plan = replace(settings.plan, avoid=False, search=None)
@@ -66,12 +66,12 @@ class GeneratedFollower(ReactivePlanner):
     ) -> None:
         """See `ReactivePlanner`: the path, from about where the arm is, is the demonstrated path, its end the goal."""
         super().go(path, exact=exact, detours=detours)
-        self._task, self._generated = _Task(path, path[-1], guide_index(path, 0.0)), None
+        self._task, self._generated = _Generation(path, path[-1], guide_index(path, 0.0)), None
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """See `Follower`: as planned, with the path generated anew from the present pose of the arm."""
         super().go(plan.path, exact=exact)
-        self._task, self._generated = _Task(plan.request.demonstrated, plan.request.goal, plan.guide), None
+        self._task, self._generated = _Generation(plan.request.demonstrated, plan.request.goal, plan.guide), None
 
     def stop(self) -> None:
         """See `ReactivePlanner`."""

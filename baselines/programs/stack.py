@@ -136,10 +136,12 @@ class StackProgram:
     def _chosen_fetch(self, k: int) -> ChosenMotion:
         """Return the grasp from which the object can also be placed."""
         target, executor = self.task.objects[k], self.executor
-        ways = grasps(self.shown, target)
-        goals = tuple(executor.object_pose(k) @ grasp for grasp in ways)
+        grasp_poses = grasps(self.shown, target)
+        goals = tuple(executor.object_pose(k) @ grasp for grasp in grasp_poses)
         motion = self._motion_choice(k, self.approach, goals, leaving=self.withdrawal if k else None)
-        return executor.choose(motion, lambda index: self._placement(k, ways[index].inverse(), leaving=self.transfer))
+        return executor.choose(
+            motion, lambda index: self._placement(k, grasp_poses[index].inverse(), leaving=self.transfer)
+        )
 
     def _placement(self, k: int, held: Pose, leaving: PosePath | None = None) -> MotionChoice:
         """Return the motion of object k from the hand to its goal."""

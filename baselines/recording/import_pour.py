@@ -30,7 +30,7 @@ TURN = np.deg2rad(20.0)
 the arm's first joint is affected."""
 
 
-class Placed(NamedTuple):
+class PlacedDemonstration(NamedTuple):
     """Recording with glasses.
 
     Attributes:
@@ -42,7 +42,7 @@ class Placed(NamedTuple):
     stands: np.ndarray
 
 
-def pour_from_poses(recorded: Demonstration) -> Placed:
+def pour_from_poses(recorded: Demonstration) -> PlacedDemonstration:
     """Return the demonstration "carry" of a recording that starts with the source in the hand and ends with it tilted.
 
     Args:
@@ -74,7 +74,7 @@ def pour_from_poses(recorded: Demonstration) -> Placed:
         segments=(Segment("carry", 0, len(hand) - 1, "target", target, "source"),),
         object_sizes={glass.name: extents(glass.shape) for glass in GLASSES},
     )
-    return Placed(demonstration, bottoms)
+    return PlacedDemonstration(demonstration, bottoms)
 
 
 def _lips(source: PosePath, forward: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from .scripted_recorder import ScriptedMotion, Waypoint, recorded
 
 GRASP = Pose.from_position_quaternion([-0.055, 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
 """Pose of the hand (tcp) in the book's frame: 25 mm behind the spine, level, fingers on the covers."""
-BEFORE, LIFT, WAY_IN = 0.13, 0.15, 0.22
+BEFORE, LIFT, INSERTION_DEPTH = 0.13, 0.15, 0.22
 """Distances [m]: approach to the grasp, lift off the stand, motions into and out of the shelf."""
 ABOVE = 0.003
 """Height [m] above the shelf board at which the book is inserted and released."""
@@ -35,7 +35,7 @@ def shelve_script(observation: dict[str, np.ndarray], width: float) -> Iterator[
     """
     grasp = Pose.from_vector(observation["object_pose"][0]) @ GRASP
     release = _up(ABOVE) @ Pose.from_vector(observation["goal_pose"][0]) @ GRASP
-    lifted, before = _up(LIFT) @ grasp, release @ _along(-WAY_IN)
+    lifted, before = _up(LIFT) @ grasp, release @ _along(-INSERTION_DEPTH)
     yield ScriptedMotion("approach", (Waypoint(grasp @ _along(-BEFORE)),))
     yield ScriptedMotion("reach", (Waypoint(grasp, SLOW),), "book0", gripper=1.0)
     yield ScriptedMotion("lift", (Waypoint(lifted),), held="book0")

@@ -75,7 +75,7 @@ def _lines(seen: Showcase) -> list[tuple[np.ndarray, str, dict[str, Any]]]:
     lines.append((seen.executed, "executed", dashed))
     dotted = {"color": OBSTACLE_FACE, "linewidth": 1.2, "linestyle": (0, (1, 1.5)), "zorder": 3}
     traces = [np.array(trace) for trace in seen.traces.values()]
-    lines += [(trace, "obstacle's way", dotted) for trace in traces if np.ptp(trace, axis=0).max() > MOVED]
+    lines += [(trace, "obstacle's path", dotted) for trace in traces if np.ptp(trace, axis=0).max() > MOVED]
     labels = [label for _, label, _ in lines]
     return [
         (points, label if labels.index(label) == k else "", style) for k, (points, label, style) in enumerate(lines)

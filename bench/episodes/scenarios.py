@@ -14,9 +14,9 @@ from ..atomic_files import canonical, sha256_of, write_whole
 
 FILE = "scenarios.json"
 VERSION = 1
-PLACE = ("task", "robot", "level", "obstacles", "env", "seed")
+SCENE_KEYS = ("task", "robot", "level", "obstacles", "env", "seed")
 """Keys of a cell that determine its scenarios."""
-HOW = ("control_mode", "reward")
+POLICY_KEYS = ("control_mode", "reward")
 """Arguments of environments that change actions or rewards but not the start: methods that differ only in them share
 their scenarios, and are paired."""
 
@@ -54,7 +54,7 @@ def scenarios_of(config: RunConfig) -> list[Scenario]:
 
 def place_of(config: RunConfig) -> str:
     """Return the scenario key of a cell as JSON text: cells with equal keys share their scenarios and are paired."""
-    return canonical(_place({key: getattr(config, key) for key in PLACE}))
+    return canonical(_place({key: getattr(config, key) for key in SCENE_KEYS}))
 
 
 def lists_of(cells: Iterable[RunConfig]) -> list[RunConfig]:
@@ -99,7 +99,7 @@ class Suite:
             config: the cell.
             index: position in the cell's list.
         """
-        values = {key: getattr(config, key) for key in PLACE}
+        values = {key: getattr(config, key) for key in SCENE_KEYS}
         return self._at[_key(values, config.seed, index)]
 
     def feasible(self, config: RunConfig) -> list[Scenario]:
@@ -129,8 +129,8 @@ def _key(values: Mapping[str, Any], seed: int, index: int) -> tuple[str, int]:
 
 
 def _place(values: Mapping[str, Any]) -> dict[str, Any]:
-    place = {key: values[key] for key in PLACE}
-    return {**place, "env": {key: value for key, value in place["env"].items() if key not in HOW}}
+    place = {key: values[key] for key in SCENE_KEYS}
+    return {**place, "env": {key: value for key, value in place["env"].items() if key not in POLICY_KEYS}}
 
 
 def read_suite(folder: Path) -> Suite | None:

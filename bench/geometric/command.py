@@ -79,7 +79,7 @@ def run_geometric(
             rows = completed(output, suite, order, dispatcher, say)
         say.print(f"{len(rows)} paths, {time.perf_counter() - begun:.0f} s")
     except KeyboardInterrupt:
-        say.print(labeled("stopped", "yellow", "what is done is kept; the same command goes on"))
+        say.print(labeled("stopped", "yellow", "finished paths are kept; the same command continues"))
         return INTERRUPTED
     from .report import write_geometric
 

@@ -201,7 +201,7 @@ def run_perf(pattern: str, json_file: Path | None) -> int:
     if json_file:
         check_writable("--json", json_file)
     out, rows = console(), []
-    out.print("a line is well when its value is at most its goal")
+    out.print("a row passes if its value does not exceed its limit")
     for name, measure in wanted.items():
         with console(stderr=True).status(f"measuring: {name}"):
             rows.append(measure())

@@ -71,7 +71,7 @@ def _step(task: str, name: str) -> Row:
         mujoco.mj_step(model, data, substeps)
 
     mine, physics = seconds_per_call(step, raw, together=True)
-    assert np.array_equal(env.sim.data.qpos, data.qpos), "the two scenes went different ways"
+    assert np.array_equal(env.sim.data.qpos, data.qpos), "the two scenes have diverged"
     note = (
         f"{mine * 1e3:.3f} ms against {physics * 1e3:.3f} ms for {substeps} substeps; two scenes with swaying arms, "
         "from the same start, under the same controls, to the same bits"

@@ -90,7 +90,7 @@ def timed_tree(planned: ScenePlan, repeats: int) -> TreeTimes:
     masks = contact_masks(names, scene.obstacles, [pair for pair in scene.allowed if pair[0] in names])
     tree = escape_path(path, tool, scene.obstacles, settings, masks=masks).tree
     if tree is None:
-        raise ValueError(f"{scene.name}: the way is free")
+        raise ValueError(f"{scene.name}: no detour is needed")
     levels = levels_of(tree)
     detour = _milliseconds(lambda: escape_path(path, tool, scene.obstacles, settings, masks=masks), repeats)
     g = tool_arrays(tool, pack(scene.obstacles), masks=masks, margin=settings.distance)

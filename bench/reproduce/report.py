@@ -110,7 +110,7 @@ def _section(each: Finished, output: Path) -> list[Block]:
         colors += ["Cyan: the collision-free path.", "Green: every tangent plane of the last tree."]
     else:
         among = each.rows[0]["clearance_mm_min"] is not None
-        colors += ["Cyan: led round what nobody showed."] if among else []
+        colors += ["Cyan: the detour round obstacles that were not demonstrated."] if among else []
         colors += ["Dashed: as executed."]
     shown = [
         Picture(file, (output / file).read_bytes(), f"{experiment.title} ({Path(file).stem})", "png")

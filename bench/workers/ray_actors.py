@@ -30,7 +30,7 @@ PATIENCE = 5.0
 """Time [s] in which a cluster must answer; Ray itself would try for minutes."""
 
 
-class Actor:
+class RemoteHandler:
     """Job handler in a Ray process."""
 
     def __init__(self, handler: type[JobHandler]):
@@ -86,7 +86,7 @@ class RayActors:
         except (ConnectionError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0]
             raise BadConfig("Ray", "address", f"no cluster at {address or 'this machine'}: {reason}") from None
-        self._actor = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Actor)
+        self._actor = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(RemoteHandler)
 
     def spawn(self) -> ActorWorker:
         """See `WorkerBackend`."""

@@ -25,7 +25,7 @@ ASIDE = {"L0": 0.0, "L1": 0.03, "L2": 0.06}
 """Largest shift [m] of the held glass in x, y and z, by layout name."""
 TURNS = np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0))
 """Turns [rad] of the direction of pouring from the nominal one; the first in which pouring is possible is used."""
-WAY = tuple(np.linspace(0.0, 1.0, 9))
+TILTS = tuple(np.linspace(0.0, 1.0, 9))
 """Shares of the pouring tilt at which a posture must be reachable from the start."""
 MAX_STARTS = 200
 
@@ -169,7 +169,7 @@ class TiltPourEnv(SingleMotionEnv[PourProgress], PourEnv):
             yaw = self._yaw_at(rim, TARGET) + turn
             hand = Pose.from_position_quaternion(shift) @ pouring(glass, rim, yaw, 0.0, BACK, UP)
             q = holding_joints(arm, [hand], self._ready[0])
-            if q is not None and can_follow(arm, q, [pouring(glass, rim, yaw, part * TILTED) for part in WAY]):
+            if q is not None and can_follow(arm, q, [pouring(glass, rim, yaw, part * TILTED) for part in TILTS]):
                 return q[None]
         return None
 

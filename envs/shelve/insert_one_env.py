@@ -16,11 +16,11 @@ from ..simulation.simulation import Start
 from ..simulation.state import State
 from .parts import BOOK_SIZE
 from .rules import MAX_ANGLE, MAX_OFFSET, WITHDRAWN, ShelveProgress
-from .shelve_env import GRASP, WAY_IN, ShelveEnv
+from .shelve_env import GRASP, INSERTION_DEPTH, ShelveEnv
 
 ASIDE, TURN = {"L0": 0.0, "L1": 0.01, "L2": 0.02}, {"L0": 0.0, "L1": np.deg2rad(3.0), "L2": np.deg2rad(6.0)}
 """Largest shift [m] in x, y and z and largest turn [rad] of the held book, by layout name."""
-WAY = (0.75, 0.5, 0.25, 0.0)
+INSERTION_STEPS = (0.75, 0.5, 0.25, 0.0)
 """Shares of the insertion distance at which a posture must be reachable from the start."""
 MAX_STARTS = 200
 
@@ -159,7 +159,10 @@ class InsertOneEnv(SingleMotionEnv[ShelveProgress], ShelveEnv):
     def _before_slot(self, layout: str) -> np.ndarray | None:
         """Return joints (1, dof) that hold the book in front of its slot and can insert it straight, or None."""
         release = Pose.from_vector(self._goal_pose[0]) @ GRASP
-        back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, *WAY)]
+        back = [
+            release @ Pose.from_position_quaternion([0.0, 0.0, -part * INSERTION_DEPTH])
+            for part in (1.0, *INSERTION_STEPS)
+        ]
         aside, turn = ASIDE[layout], TURN[layout]
         shift = self.np_random.uniform(-aside, aside, 3)
         book = back[0] @ GRASP.inverse() @ Pose.from_yaw([0, 0, 0], self.np_random.uniform(-turn, turn))

@@ -16,13 +16,13 @@ from .parts import BOOK_SIZE, CLUTTER, PITCH, SHELVES, WIDTH
 from .places import ShelfPlaces
 
 OPTIONS = ("level", "obstacles", "stand_pose", "cupboard_pose", "slots", "books", "clutter", "joint_positions")
-STAND_WAY, STAND_LOWER, STAND_HIGHER, STAND_TURN = 0.12, 0.15, 0.10, np.deg2rad(45.0)
+STAND_SHIFT, STAND_LOWER, STAND_HIGHER, STAND_TURN = 0.12, 0.15, 0.10, np.deg2rad(45.0)
 """Largest deviations of a given stand from the nominal one: aside, down, up [m], yaw [rad]."""
-CUPBOARD_WAY, CUPBOARD_TURN = 0.05, np.deg2rad(20.0)
+CUPBOARD_SHIFT, CUPBOARD_TURN = 0.05, np.deg2rad(20.0)
 """Largest deviations of a given cupboard from the nominal one [m, rad]: it stands on the table, within reach."""
 LOWEST_STAND = 1.0
 """Height (z) [m] of the stand's top below which its tube would pierce the plate."""
-BOOK_WAY = np.array([0.015, 0.03, np.deg2rad(20.0)])
+BOOK_SHIFT = np.array([0.015, 0.03, np.deg2rad(20.0)])
 """Largest deviations of a given book from the middle of the stand, x, y [m] and yaw [rad]: it lies safely, and
 fingers fit."""
 BESIDE = 0.03
@@ -44,12 +44,12 @@ def given_layout(drawn: ShelfLayout, options: dict[str, Any], places: ShelfPlace
     changes: dict[str, Any] = {}
     if "stand_pose" in options:
         lower = min(STAND_LOWER, places.stand[2] - LOWEST_STAND)
-        nominal, bounds = (places.stand, places.stand_yaw), (STAND_WAY, lower, STAND_HIGHER, STAND_TURN)
+        nominal, bounds = (places.stand, places.stand_yaw), (STAND_SHIFT, lower, STAND_HIGHER, STAND_TURN)
         changes["stand"] = _standing("stand_pose", options["stand_pose"], nominal, bounds)
     if "cupboard_pose" in options:
         nominal, bounds = (
             ((*places.cupboard, TABLE_HEIGHT), places.cupboard_yaw),
-            (CUPBOARD_WAY, 0.001, 0.001, CUPBOARD_TURN),
+            (CUPBOARD_SHIFT, 0.001, 0.001, CUPBOARD_TURN),
         )
         changes["cupboard"] = _standing("cupboard_pose", options["cupboard_pose"], nominal, bounds)
     if "slots" in options:
@@ -84,8 +84,8 @@ def _lying(value: Any, count: int) -> np.ndarray:
     """Return given places (count, 3) of books on the stand."""
     books = checked_array("books", value, (count, 3))
     for k, off in enumerate(np.abs(books)):
-        if (off > BOOK_WAY).any():
-            x, y, yaw = BOOK_WAY
+        if (off > BOOK_SHIFT).any():
+            x, y, yaw = BOOK_SHIFT
             allowed = f"x by {x:g} m, y by {y:g} m, yaw by {yaw:.2f} rad"
             raise BadOption(
                 "books", f"book {k} at {np.round(books[k], 3).tolist()} would not lie on the stand; {allowed}"

@@ -26,7 +26,7 @@ from .places import SHELF_PLACES
 from .rules import ShelveProgress
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
-LIFT, WAY_IN = 0.15, 0.22
+LIFT, INSERTION_DEPTH = 0.15, 0.22
 """Height of the hand above the stand, and distance in front of the slot, at the ends of a carry [m]."""
 GRASP = Pose.from_position_quaternion([0.025 - 0.5 * BOOK_SIZE[0], 0.0, 0.0], (0.5, 0.5, 0.5, 0.5))
 """Tcp pose in the frame of a book held by the spine, 25 mm deep, fingers on its covers."""
@@ -218,7 +218,7 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
         for k, goal in enumerate(self._goal_pose):
             grasp, release = self._drawn.handed(k) @ GRASP, Pose.from_vector(goal) @ GRASP
             up = Pose.from_position_quaternion([0.0, 0.0, LIFT])
-            back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * WAY_IN]) for part in (1.0, 0.5)]
+            back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * INSERTION_DEPTH]) for part in (1.0, 0.5)]
             keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
             held = (Box(BOOK_SIZE), GRASP.inverse(), 2 * k + 1)
             motions.append(PlacementMotion(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))

@@ -20,7 +20,7 @@ from .arm import Arm
 from .body import BODY, Body
 from .chain_readers import mujoco_bodies, mujoco_id, mujoco_pose, pinocchio_axis, turn_z_to
 from .kinematics import PRISMATIC, REVOLUTE
-from .link_capsules import Geometry, Joint, Link, RobotModel, Split, body_of, joined, joint_frames, moved, placed
+from .link_capsules import BodyPart, Geometry, Joint, RobotModel, Split, body_of, joined, joint_frames, moved, placed
 
 NOTHING = Geometry([], np.zeros((0, 3)))
 
@@ -62,7 +62,7 @@ def body_from_mujoco(model: Any, arm: Arm, joint_names: Sequence[str], *, split:
             others = tuple(_mujoco_joint(model, joint) for joint in joints[body])
         pose = mujoco_pose(model.body_pos[body], model.body_quat[body])
         geometry = joined([NOTHING, *(_mujoco_geometry(model, geom) for geom in _solid(model, body))])
-        parts.append(Link(model.body(body).name, int(model.body_parentid[body]) - 1, pose, own, others, geometry))
+        parts.append(BodyPart(model.body(body).name, int(model.body_parentid[body]) - 1, pose, own, others, geometry))
     chain = [(int(model.jnt_bodyid[joint]) - 1, model.jnt_axis[joint], model.jnt_pos[joint]) for joint in wanted]
     return body_of(RobotModel(source, parts, model.qpos0[model.jnt_qposadr[wanted]], chain), arm, split)
 
@@ -204,7 +204,9 @@ def _geometry_of(shape: Shape) -> Geometry:
     return Geometry([], corner_points(shape))
 
 
-def _pinocchio_parts(model: Any, geometry: Any, chain: list[int], world_from_root: Pose, source: Path) -> list[Link]:
+def _pinocchio_parts(
+    model: Any, geometry: Any, chain: list[int], world_from_root: Pose, source: Path
+) -> list[BodyPart]:
     """Return one part per joint (number 0: the root) with the link the joint moves, then one per link welded on."""
     joined_links: dict[tuple[int, int], list[Geometry]] = {}
     for item in geometry.geometryObjects:
@@ -217,14 +219,14 @@ def _pinocchio_parts(model: Any, geometry: Any, chain: list[int], world_from_roo
         own = links.pop(min((key for key in links if key[0] == joint), default=(-1, -1)), NOTHING)
         if joint == 0:
             own = joined([own, *(links.pop(key) for key in [key for key in links if key[0] == 0])])
-            parts.append(Link("root", -1, world_from_root, -1, (), own))
+            parts.append(BodyPart("root", -1, world_from_root, -1, (), own))
             continue
         pose = Pose.from_matrix(model.jointPlacements[joint].homogeneous)
         frame = chain.index(joint) if joint in chain else None
         others = () if joint in chain else (_pinocchio_joint(model, joint, source),)
-        parts.append(Link(model.names[joint], int(model.parents[joint]), pose, frame, others, own))
+        parts.append(BodyPart(model.names[joint], int(model.parents[joint]), pose, frame, others, own))
     welded = [
-        Link(model.frames[link].name, joint, Pose.identity(), None, (), own) for (joint, link), own in links.items()
+        BodyPart(model.frames[link].name, joint, Pose.identity(), None, (), own) for (joint, link), own in links.items()
     ]
     return parts + welded
 

@@ -64,7 +64,7 @@ class Geometry(NamedTuple):
     points: np.ndarray
 
 
-class Link(NamedTuple):
+class BodyPart(NamedTuple):
     """A part of a robot: geometry that moves as one.
 
     Attributes:
@@ -95,7 +95,7 @@ class RobotModel(NamedTuple):
     """
 
     source: str
-    parts: list[Link]
+    parts: list[BodyPart]
     reference: np.ndarray
     joints: list[tuple[int, np.ndarray, np.ndarray]]
 
@@ -182,7 +182,7 @@ def body_of(robot: RobotModel, arm: Arm, split: Split) -> Body:
     return Body(np.array(rows), tuple(labels))
 
 
-def _world_from_parts(parts: list[Link]) -> list[Pose]:
+def _world_from_parts(parts: list[BodyPart]) -> list[Pose]:
     world: list[Pose] = []
     for part in parts:
         world.append(part.pose if part.parent < 0 else world[part.parent] @ part.pose)
@@ -245,7 +245,7 @@ def _swept(robot: RobotModel, k: int) -> np.ndarray:
     return _fewer(np.vstack(clouds))
 
 
-def _through(robot: RobotModel, part: Link, points: np.ndarray) -> np.ndarray:
+def _through(robot: RobotModel, part: BodyPart, points: np.ndarray) -> np.ndarray:
     """Return the points of a part, swept by its joints, in the parent's frame."""
     for joint in reversed(part.joints):
         points = _fewer(sweep(joint, points, robot.source, part.name))

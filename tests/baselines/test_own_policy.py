@@ -92,7 +92,7 @@ def test_it_has_no_legs_to_be_moved_in_another_frame(change, monkeypatch, capsys
         main()
     assert stopped.value.code == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "tool: my_policies:Above moves the hand itself: only the legs of shipped policies" in said
+    assert "tool: my_policies:Above moves the hand itself: only shipped policies can plan" in said
 
 
 @pytest.mark.parametrize(
