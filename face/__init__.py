@@ -31,6 +31,7 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
             ".configs.demonstrations": ("load_demonstration",),
             ".planner.errors": ("OneDemoError",),
         },
+        packages=("baselines", "configs", "envs", "planner"),
     )
 
 former_paths.keep()

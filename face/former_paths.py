@@ -49,8 +49,18 @@ class FormerModule(ModuleType):
 
     def __getattr__(self, name: str) -> Any:
         """Give a name of the present module."""
+        if name == "__all__":
+            return dir(self)
         former = self.__name__.partition(".")[2]
         return getattr(import_module(f"{__package__}.{MOVED[former]}"), RENAMED.get((former, name), name))
+
+    def __dir__(self) -> list[str]:
+        """Return the public names of the present module, and former names."""
+        former = self.__name__.partition(".")[2]
+        present = vars(import_module(f"{__package__}.{MOVED[former]}"))
+        return sorted(
+            {*(key for key in present if not key.startswith("_")), *(old for m, old in RENAMED if m == former)}
+        )
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function of the module's own name: it hides the public name of that package, as `certify`."""
@@ -76,7 +86,9 @@ class FormerPaths(MetaPathFinder, Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Let the module hand out the names of the present one."""
         present = f"{__package__}.{MOVED[module.__name__.partition('.')[2]]}"
-        warnings.warn(f"{module.__name__} is now {present}", DeprecationWarning, stacklevel=2)
+        package = ".".join(present.split(".")[:2])
+        words = f"{module.__name__} is now {present}; public names are best imported from {package}"
+        warnings.warn(words, DeprecationWarning, stacklevel=2)
         module.__class__ = FormerModule
 
 

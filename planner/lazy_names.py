@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
 
 def lazy_names(
-    package: str, modules: Mapping[str, tuple[str, ...]]
+    package: str, modules: Mapping[str, tuple[str, ...]], packages: Sequence[str] = ()
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return `__getattr__` and `__dir__` of a package whose public names are imported on first use.
 
@@ -19,10 +19,13 @@ def lazy_names(
     Args:
         package: its `__name__`.
         modules: names by the module that defines them, relative to the package, like {".geometry.pose": ("Pose",)}.
+        packages: packages directly below this one that are attributes, too.
     """
     where = {name: module for module, names in modules.items() for name in names}
 
     def get(name: str) -> Any:
+        if name in packages:
+            return import_module(f"{package}.{name}")
         if name not in where:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = getattr(import_module(where[name], package), name)
@@ -30,6 +33,6 @@ def lazy_names(
         return value
 
     def names() -> list[str]:
-        return sorted({*where, *vars(sys.modules[package])})
+        return sorted({*where, *packages, *vars(sys.modules[package])["__all__"]})
 
     return get, names

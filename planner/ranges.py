@@ -56,8 +56,9 @@ def check_choice(name: str, value: object, known: Iterable[str]) -> None:
     Raises:
         BadOption: the word is unknown.
     """
-    if value not in tuple(known):
-        raise BadOption(name, f"{value!r} is not one of {', '.join(known)}")
+    words = tuple(known)
+    if value not in words:
+        raise BadOption(name, f"{value!r} is not one of {', '.join(word or repr(word) for word in words)}")
 
 
 @cache

@@ -65,6 +65,14 @@ def test_the_version_is_that_of_the_distribution():
     assert onedemo.__version__ == version("onedemo")
 
 
+def test_the_packages_are_attributes_of_the_root():
+    code = "import onedemo; print(onedemo.envs.IDS['onedemo/Stack-v0'].seconds, sorted(dir(onedemo)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(
+        "60.0 ['OneDemoError', '__version__', 'baselines', 'configs', 'envs', 'load_demonstration'"
+    )
+
+
 def snippets() -> list:
     found = []
     for page in PAGES:
@@ -136,7 +144,9 @@ def test_former_paths_work_with_a_warning(former):
         f"assert one is other"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == f"onedemo.{former} is now onedemo.{MOVED[former]}"
+    assert done.stdout.startswith(
+        f"onedemo.{former} is now onedemo.{MOVED[former]}; public names are best imported from"
+    )
     for (module, old), new in RENAMED.items():
         if module == former:
             with warnings.catch_warnings():

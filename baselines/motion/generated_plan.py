@@ -18,11 +18,10 @@ from ...planner.geometry.pose import METERS_PER_RADIAN
 from ...planner.planning.plan import MotionPlanner
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from ...planner.safety.guarded_pursuit import guarded_roll_out
-from .motion_method import PATH
+from .motion_method import NO_PATH, PATH
 from .path_generators import PathGenerator
 from .tool_obstacles import ToolObstacles
 
-NO_PATH = "no way found"
 AT_GOAL = 0.005
 """Path length [m] to the goal within which a generated path counts as ending at the goal."""
 EVERY = 5
@@ -42,7 +41,7 @@ class GeneratedPlanner(MotionPlanner):
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, generator: PathGenerator):
         self.arm, self.body, self.settings, self.generator = arm, body, settings, generator
         motion = settings.motion
-        self._layout = SceneTemplate(arm, body, settings.safety, motion.dt, guard=settings.guard)
+        self._template = SceneTemplate(arm, body, settings.safety, motion.dt, guard=settings.guard)
         self._work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
         self._trace = np.empty((round(settings.max_seconds / motion.dt) + 1, arm.dof))
 
@@ -50,7 +49,8 @@ class GeneratedPlanner(MotionPlanner):
         """Plan a motion; `next_motion` and `seed` mean nothing to a path generator."""
         begun = time.perf_counter()
         q, distance = self.arm.checked(request.start), self.settings.safety.distance
-        scene = PlanningScene(self._layout, checked_obstacles(request.obstacles), distance, request.allowed)
+        request = request._replace(start=q.copy())
+        scene = PlanningScene(self._template, checked_obstacles(request.obstacles), distance, request.allowed)
         near = ToolObstacles.of(self.arm, self.body, request.obstacles, request.allowed)
         plan = self._made(request, scene, near, q, self.settings.motion.guide)
         if not plan.success and self.generator.guided:

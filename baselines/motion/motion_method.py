@@ -32,7 +32,9 @@ from ...planner.imitation.tsia import GUIDE_START
 from ...planner.planning.plan import MotionPlanner
 
 DIRECT, ESCAPE, PATH, JOINTS = "direct", "escape", "path", "joints"
-"""Values of `Plan.how`; plans of the last two kinds are followed as planned."""
+"""Values of `Plan.how`; the last two are of generated paths and of searches in joint space."""
+NO_PATH = "no way found"
+"""Reason of a plan whose generator or search found no path."""
 MADE = (PATH, JOINTS)
 
 
@@ -57,7 +59,7 @@ class Follower(Protocol):
         ...
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
-        """See `ReactivePlanner.follow`: follow a plan without replanning."""
+        """See `ReactivePlanner.follow`: follow the path of a plan."""
         ...
 
     def stop(self) -> None:

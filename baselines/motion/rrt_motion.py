@@ -24,9 +24,9 @@ from ...planner import (
 from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ..extras import needed
-from .motion_method import SCREW, Follower, MotionMethod, MotionPlanner, Relative
+from .motion_method import NO_PATH, SCREW, Follower, MotionMethod, MotionPlanner, Relative
 from .rrt_connect import RrtSettings, joint_path, timed
-from .rrt_planner import NO_PATH, NO_POSTURE, RrtPlanner
+from .rrt_planner import NO_POSTURE, RrtPlanner
 from .settings import ProgramSettings
 
 

@@ -13,10 +13,10 @@ from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.imitation.tsia import screw_path
 from ...planner.planning.plan import MotionPlanner
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
-from .motion_method import JOINTS
+from .motion_method import JOINTS, NO_PATH
 from .rrt_connect import RrtSettings, joint_path, timed
 
-NO_PATH, NO_POSTURE = "no way found", "ik_or_limit"
+NO_POSTURE = "ik_or_limit"
 MORE = 3
 """Number of doublings of the starts of the inverse kinematics."""
 APPROACH_STEP = 0.01
@@ -47,13 +47,14 @@ class RrtPlanner(MotionPlanner):
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, sampling: RrtSettings):
         self.arm, self.body, self.settings, self.sampling = arm, body, settings, sampling
-        self._layout = SceneTemplate(arm, body, settings.safety, settings.motion.dt)
+        self._template = SceneTemplate(arm, body, settings.safety, settings.motion.dt)
         self._low = np.maximum(arm.lower, -np.pi) + sampling.margin
         self._high = np.minimum(arm.upper, np.pi) - sampling.margin
 
     def answer(self, request: PlanRequest) -> Plan:
         """Plan a motion; of the demonstrated path only the end matters."""
         begun, q = time.perf_counter(), self.arm.checked(request.start)
+        request = request._replace(start=q.copy())
         joints, reason = q[None], ""
         for end in [request.goal] if request.leaving is None else [request.leaving[-1], request.goal]:
             found = self.joints_or_reason(joints[-1], end, request.obstacles, request.allowed, request.seed)
@@ -104,8 +105,8 @@ class RrtPlanner(MotionPlanner):
             Joints (t, dof) [rad] at every tick, or the reason of failure.
         """
         distance = self.settings.safety.distance
-        scene = PlanningScene(self._layout, checked_obstacles(obstacles), distance, allowed)
-        strict = PlanningScene(self._layout, checked_obstacles(obstacles), distance)
+        scene = PlanningScene(self._template, checked_obstacles(obstacles), distance, allowed)
+        strict = PlanningScene(self._template, checked_obstacles(obstacles), distance)
         postures = self._postures(q, goal, scene, strict)
         if not postures:
             return NO_POSTURE

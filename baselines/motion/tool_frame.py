@@ -28,8 +28,12 @@ def seen_from(plan: Plan, arm: Arm, tcp_from_other: Pose) -> Plan:
         arm: the arm with the other frame as its tcp.
         tcp_from_other: the other frame in the frame of the plan's tcp.
     """
-    request = plan.request._replace(
-        demonstrated=plan.request.demonstrated.with_tool(tcp_from_other), goal=plan.request.goal @ tcp_from_other
+    asked = plan.request
+    request = asked._replace(
+        demonstrated=asked.demonstrated.with_tool(tcp_from_other),
+        goal=asked.goal @ tcp_from_other,
+        leaving=None if asked.leaving is None else asked.leaving.with_tool(tcp_from_other),
+        next_motion=_next_motion(asked.next_motion, tcp_from_other),
     )
     imitated, path = (dq.mul(poses, tcp_from_other.dq) for poses in (plan.imitated_poses, plan.path_poses))
     return plan._replace(

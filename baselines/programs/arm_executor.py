@@ -185,7 +185,7 @@ class ArmExecutor:
             exact: False: finish as soon as the tool is within reach of the end.
             next_motion: the next motion: where there is a choice, the path ends in a posture that suits it.
             detours: False: along the path or not at all.
-            plan: the plan the path comes from; followed as planned, without replanning, if its kind is PATH.
+            plan: the plan the path comes from; if its kind is PATH, the follower gets the plan itself.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", the held object

@@ -185,8 +185,8 @@ class PourProgram:
         """Return the index of the pose from which the hand, or the held object, stays near a glass."""
         glass = pack([Obstacle(self.task.objects[index].shape, self.executor.object_pose(index))])
         tool = body.tool(self.executor.arm)
-        rooms = np.array([tool_clearance(tool, row[None], glass) for row in path.dqs])
-        far = np.flatnonzero(rooms > NEAR)
+        clearances = np.array([tool_clearance(tool, row[None], glass) for row in path.dqs])
+        far = np.flatnonzero(clearances > NEAR)
         return max(1, int(far[-1])) if len(far) else 1
 
     def _planned(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> CarryCandidate:

@@ -155,7 +155,7 @@ def judge_state(poses, velocities, beads, touching, sizes, memory):
         beads: (n, 3) positions of the beads [m].
         touching: (owners, owners) contacts, see `State`.
         sizes: (2, 2) radius and height [m] of both glasses.
-        memory: (7,) see `WAS_LIFTED`; updated.
+        memory: (7,) see `MEMORY`; updated.
     """
     n, source, target = len(beads), poses[SOURCE], poses[TARGET]
     inside = beads_inside(source, sizes[SOURCE, 0], sizes[SOURCE, 1], beads)

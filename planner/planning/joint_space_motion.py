@@ -117,7 +117,7 @@ def plan_joint_space(
     goal: Pose,
     q: np.ndarray,
     settings: PlanSettings,
-    after: NextMotionCheck | None,
+    check: NextMotionCheck | None,
     seed: int,
 ) -> JointSpaceMotion | None:
     """Search a path in joint space to the goal, imitating the end of the demonstration; None without success.
@@ -130,7 +130,7 @@ def plan_joint_space(
         goal: pose of the tcp at the end.
         q: (dof,) joints at the start.
         settings: see `PlanSettings`.
-        after: check of the next motion; None: there is none.
+        check: check of the next motion; None: there is none.
         seed: of all random choices.
     """
     search = settings.search
@@ -143,7 +143,7 @@ def plan_joint_space(
     for turn in range(search.rounds):
         later = search.rounds - 1 - turn
         iterations = max(search.iterations // ROUND_SHRINK**later, min(MIN_ITERATIONS, search.iterations))
-        found = _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, search.seeds * 2**turn)
+        found = _postures(arm, scene, work, demonstrated, goal, q, settings, check, rng, search.seeds * 2**turn)
         best, least = None, math.inf
         for posture in sorted(found)[: search.postures]:
             if posture.cost >= least:
@@ -168,7 +168,7 @@ def _length(points: np.ndarray) -> float:
     return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
 
 
-def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, seeds) -> list[_Posture]:
+def _postures(arm, scene, work, demonstrated, goal, q, settings, check, rng, seeds) -> list[_Posture]:
     """Clear postures on the imitated path from which the rest of it can be followed, with their costs."""
     search, found = settings.search, []
     imitated = imitated_path(demonstrated, goal)
@@ -190,10 +190,10 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, after, rng, see
                 continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
             cost += search.late * (index - first) / max(last - first, 1)
-            next_feasible = after is None or after.is_feasible(arm, work, tail[-1], settings)
+            next_feasible = check is None or check.is_feasible(arm, work, tail[-1], settings)
             if not next_feasible:
-                assert after is not None
-                cost += INFEASIBLE_COST if after.required else 5.0
+                assert check is not None
+                cost += INFEASIBLE_COST if check.required else 5.0
             found.append(_Posture(cost, len(found), solution, tail, path, index, next_feasible))
     return found
 

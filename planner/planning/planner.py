@@ -76,6 +76,7 @@ class Planner(MotionPlanner):
         """
         begun = time.perf_counter()
         q = self.arm.checked(request.start)
+        request = request._replace(start=q.copy())
         obstacles = checked_obstacles(request.obstacles)
         scene = PlanningScene(self._template, obstacles, self.settings.repet.distance, request.allowed)
         run = _Run(request, scene, q, self._check_of(scene, request))

@@ -91,7 +91,7 @@ class PlanningScene:
     Without a guard `robot` is among no obstacles; `seen` always is among all of them.
 
     Args:
-        layout: the arrays of the arm and its body.
+        template: the arrays of the arm and its body.
         obstacles: as they are now.
         distance: planning margin [m] of the tool from obstacles without a margin of their own.
         allowed: pairs of names (part of the body or held object, obstacle) that may touch.
@@ -99,24 +99,26 @@ class PlanningScene:
 
     def __init__(
         self,
-        layout: SceneTemplate,
+        template: SceneTemplate,
         obstacles: Sequence[Obstacle],
         distance: float,
         allowed: Sequence[tuple[str, str]] = (),
     ):
         packed, self._distance = pack(obstacles), distance
-        self._template = layout
+        self._template = template
         self._names = [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(obstacles)]
-        masks = contact_masks(layout.names, obstacles, allowed)
-        self.seen = with_obstacles(layout.robot, packed, masks, layout.safety.distance)
+        masks = contact_masks(template.names, obstacles, allowed)
+        self.seen = with_obstacles(template.robot, packed, masks, template.safety.distance)
         self.robot = (
-            self.seen if layout.alone is None else with_obstacles(layout.alone, pack(()), (), layout.safety.distance)
+            self.seen
+            if template.alone is None
+            else with_obstacles(template.alone, pack(()), (), template.safety.distance)
         )
-        tool_masks = [sum(1 << k for k, row in enumerate(layout.at_tool) if mask >> int(row) & 1) for mask in masks]
-        self._tool = with_obstacles(layout.tool, packed, tool_masks, distance)
+        tool_masks = [sum(1 << k for k, row in enumerate(template.at_tool) if mask >> int(row) & 1) for mask in masks]
+        self._tool = with_obstacles(template.tool, packed, tool_masks, distance)
         self._margins = self._tool[ROW.obstacles : ROW.obstacles + len(obstacles), OBSTACLE.margin]
         self._own = packed.rows[:, OBSTACLE.own_margin] >= 0.0
-        self.robot_distance = layout.safety.distance
+        self.robot_distance = template.safety.distance
 
     @staticmethod
     def of(
@@ -138,8 +140,8 @@ class PlanningScene:
         Raises:
             BadOption: there are too many obstacles.
         """
-        layout = SceneTemplate(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
-        return PlanningScene(layout, checked_obstacles(obstacles), settings.repet.distance, allowed)
+        template = SceneTemplate(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
+        return PlanningScene(template, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
     def move(self, obstacles: Sequence[Obstacle]) -> None:
         """Move the same obstacles to other places, with other velocities."""

@@ -14,24 +14,23 @@ Waiting for something that moves to pass is part of PURSUING and DETOURING: see 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import Enum, auto
 
 import numpy as np
 
 from ..control.pursuit import fresh_pursuit_state
 from ..geometry.pose import PosePath
 from ..planning.plan import NextMotion
-from .command import DONE, ESCAPING, FAILED, FOLLOWING
 
 
 class Mode(Enum):
-    """Mode of a motion; the value is the state that its commands report."""
+    """Mode of a motion; see the module."""
 
-    PURSUING = FOLLOWING
-    DETOURING = ESCAPING
-    TRACKING = "tracking"
-    DONE = DONE
-    FAILED = FAILED
+    PURSUING = auto()
+    DETOURING = auto()
+    TRACKING = auto()
+    DONE = auto()
+    FAILED = auto()
 
 
 @dataclass(slots=True, eq=False)
@@ -49,7 +48,7 @@ class MotionState:
         joints: (t, dof) that are tracked; None: none.
         tracked: index of the next row of `joints`.
         reached: index of the nominal pose from which on the rest was last planned.
-        tries: number of times that a stall led to a new plan.
+        tries: number of stalls so far.
         stalled: seconds of all stalls before the current one.
         refusal: reason and detail of the last plan; "" if it succeeded.
         reason: why the motion failed; "".

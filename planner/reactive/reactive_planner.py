@@ -52,7 +52,7 @@ class ReactivePlanner:
         settings: see `ReactiveSettings`.
 
     Attributes:
-        motion: the motion that is followed, or how it ended; None: none since `stop`.
+        motion: the motion that is followed, or how it ended; None before `go` and after `stop`.
     """
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings | None = None):

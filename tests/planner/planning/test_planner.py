@@ -189,7 +189,7 @@ def test_a_batch_is_the_same_as_one_by_one():
         plan_batch(requests, arm, body, workers=0)
 
 
-def test_the_function_is_the_planner():
+def test_a_used_planner_answers_like_a_new_one():
     arm, body, _ = panda()
     scene = problem("convex", 7)
     one = Planner(arm, body).plan(demonstrated(), scene.start, scene.goal, scene.obstacles, seed=7)

@@ -1,4 +1,4 @@
-"""Following a leg among obstacles that come, go, move and stay; the arm is ideal, the judge is room_at."""
+"""Following a leg among obstacles that come, go, move and stay; the arm is ideal, the judge is slack_at."""
 
 from __future__ import annotations
 
