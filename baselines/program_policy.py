@@ -56,12 +56,12 @@ class Episode:
     """Memory of an episode: the executor, the running program and its end.
 
     Args:
-        hand: executor of one or two arms.
+        executor: of one or two arms.
         program: program of the task.
     """
 
-    def __init__(self, hand: ArmExecutor | DualArmExecutor, program: Program):
-        self.executor, self.program = hand, program
+    def __init__(self, executor: ArmExecutor | DualArmExecutor, program: Program):
+        self.executor, self.program = executor, program
         self.actions: Iterator[np.ndarray] | None = program.actions()
         self.ended = PolicyReport()
 

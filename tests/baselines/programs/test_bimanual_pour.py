@@ -32,7 +32,7 @@ def policy(env):
 def begun(env, policy, seed, level):
     observation, _ = env.reset(seed=seed, options={"level": level})
     memory = policy.begin(observation)
-    held = [memory.hand.held(k, k) for k in range(2)]
+    held = [memory.executor.held(k, k) for k in range(2)]
     return memory, held
 
 
@@ -73,7 +73,7 @@ def test_it_pours(env, policy, seed, level):
 
 def test_what_stands_in_the_way_stops_both_hands(env, policy):
     memory, held = begun(env, policy, 0, "L0")
-    hands = memory.hand
+    hands = memory.executor
     hands.hold(held)
     choice = memory.program._choice(held, np.array(program.PLACES[0]), *_first())
     assert hands.roll_out(choice.forth, program.SLOW).reason == ""

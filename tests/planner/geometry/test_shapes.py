@@ -158,7 +158,7 @@ def test_rows_hold_what_the_table_says():
     ]
     rows, vertices = pack(obstacles)
     assert rows.shape == (6, OBSTACLE.packed) and OBSTACLE.packed == 24
-    np.testing.assert_array_equal(rows[:, 0], [0, 1, 4, 2, 3, 4])
+    np.testing.assert_array_equal(rows[:, 0], [1, 3, 5, 2, 4, 5])
     np.testing.assert_array_equal(rows[:, 1], [0.3, 0.1, 0, 0, 0, 0])
     np.testing.assert_array_equal(rows[:, 2:5], np.tile(turn.position, (6, 1)))
     np.testing.assert_array_equal(rows[3, 5:14].reshape(3, 3), turn.rotation)
