@@ -9,10 +9,34 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+MOST_DIGITS = 9
+"""Digits behind the point at which numbers that still look equal are written as equal."""
+
 
 def _allowed(names: Iterable[Any]) -> str:
     """Name what is allowed, for the end of a message."""
     return ", ".join(str(name) for name in names)
+
+
+def told_apart(one: float, other: float, digits: int) -> tuple[str, str]:
+    """Write two numbers for a message, with as many digits as it takes to tell them apart.
+
+    Args:
+        one: a number.
+        other: another number.
+        digits: least number of digits behind the point.
+    """
+    while f"{one:.{digits}f}" == f"{other:.{digits}f}" and digits < MOST_DIGITS:
+        digits += 1
+    return f"{one:.{digits}f}", f"{other:.{digits}f}"
+
+
+def _described(value: Any) -> str:
+    """Describe a value in few words: its class, and itself if it is short."""
+    kind, text = type(value).__name__, repr(value)
+    if value is None:
+        return text
+    return f"{text}, a {kind}" if len(text) <= 40 and "\n" not in text else f"a {kind}"
 
 
 class OneDemoError(Exception):
@@ -43,6 +67,14 @@ class NotFinite(OneDemoError, ValueError):
         super().__init__(f"{what} holds a value that is not finite at index {index}")
 
 
+class WrongType(OneDemoError, TypeError):
+    """A value is of a class that cannot be used."""
+
+    def __init__(self, what: str, value: Any, expected: str):
+        self.what, self.value, self.expected = what, value, expected
+        super().__init__(f"{what} is {_described(value)}; expected {expected}")
+
+
 class BadDemonstration(OneDemoError, ValueError):
     """A demonstration, or the file it comes from, cannot be used."""
 
@@ -57,6 +89,10 @@ class BadModel(OneDemoError, ValueError):
     def __init__(self, source: str | Path, what: str, reason: str):
         self.source, self.what, self.reason = source, what, reason
         super().__init__(f"{source}: {what}: {reason}")
+
+
+class ModelWarning(UserWarning):
+    """A robot model holds what its reader does not use, or a number that looks wrong."""
 
 
 class UnfitShape(OneDemoError, ValueError):

@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from functools import cache
+from numbers import Integral
 from typing import Any
 
 from .errors import BadOption
 
+MAX_TICKS = 1_000_000
+"""Largest number of ticks of a motion: there is a row of joints for each."""
 FORM = re.compile(r"([\[(])(\S+), (\S+)([\])])")
 
 
@@ -39,10 +42,60 @@ def check_range(name: str, value: Any, interval: str) -> None:
         BadOption: the number is outside the interval, or NaN.
     """
     low, high, open_low, open_high, words = _parsed(interval)
-    above = value > low if open_low else value >= low
-    below = value < high if open_high else value <= high
-    if not (above and below):
+    try:
+        above = value > low if open_low else value >= low
+        below = value < high if open_high else value <= high
+        inside = bool(above and below)
+    except (TypeError, ValueError):
+        raise BadOption(name, f"{value!r} is not a number") from None
+    if not inside:
         raise BadOption(name, f"{value} is not {words}")
+
+
+def check_counts(settings: object, interval: str, *names: str) -> None:
+    """Refuse attributes that are no whole numbers in an interval.
+
+    Args:
+        settings: an object with these attributes.
+        interval: see `check_ranges`.
+        names: of the attributes.
+
+    Raises:
+        BadOption: an attribute is not a whole number, or outside the interval.
+    """
+    for name in names:
+        check_count(name, getattr(settings, name), interval)
+
+
+def check_count(name: str, value: Any, interval: str) -> None:
+    """Refuse what is no whole number in an interval.
+
+    Args:
+        name: of the number, for the message.
+        value: the number.
+        interval: see `check_range`.
+
+    Raises:
+        BadOption: the number is not whole, or outside the interval.
+    """
+    if not isinstance(value, Integral):
+        raise BadOption(name, f"{value!r} is not a whole number")
+    check_range(name, value, interval)
+
+
+def ticks_of(seconds: float, dt: float) -> int:
+    """Return the number of ticks in a time.
+
+    Args:
+        seconds: the time.
+        dt: seconds per tick.
+
+    Raises:
+        BadOption: there are more than `MAX_TICKS`.
+    """
+    if not seconds / dt <= MAX_TICKS:
+        raise BadOption("dt", f"{seconds:g} s are {seconds / dt:.3g} ticks of {dt:g} s; allowed are {MAX_TICKS}")
+    return round(seconds / dt)
 
 
 def check_choice(name: str, value: object, known: Iterable[str]) -> None:

@@ -23,6 +23,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import checked_kind
 from ..columns import packed_row
 from ..geometry import screw
 from ..geometry.pose import Pose
@@ -289,6 +290,10 @@ def tick(work, q, target, sign, qdot):
 class Controller:
     """The control law bound to an arm: joint speeds from joint positions and a target pose.
 
+    The law is local: it follows the screw to the target from where the arm is, and stops where a joint limit or a
+    singularity stands in the way, though another posture might lead there. From random joints to random reachable
+    targets it mostly does not arrive; `Planner` finds ways round.
+
     The controller remembers the direction of rotation (the double cover), with hysteresis; `reset` forgets it.
 
     Attributes:
@@ -297,7 +302,7 @@ class Controller:
     """
 
     def __init__(self, arm: Arm, settings: ControllerSettings | None = None):
-        self.arm = arm
+        self.arm = checked_kind("arm", arm, Arm)
         self.settings = settings or ControllerSettings()
         self._work = arm_arrays(arm, self.settings.packed())
         self._sign = 0.0
@@ -310,9 +315,12 @@ class Controller:
         """Return joint speeds (dof,) [rad/s] towards a target.
 
         Args:
-            q: (dof,) joints.
+            q: (dof,) joints [rad or m].
             target: pose of the tcp to approach.
+
+        Raises:
+            WrongType, BadShape, NotFinite: the joints are not (dof,) finite numbers, or the target is no `Pose`.
         """
-        qdot = np.empty(self.arm.dof)
-        self._sign = tick(self._work, np.asarray(q, dtype=np.float64), target.dq, self._sign, qdot)
+        joints, qdot = self.arm.checked(q), np.empty(self.arm.dof)
+        self._sign = tick(self._work, joints, checked_kind("target", target, Pose).dq, self._sign, qdot)
         return qdot

@@ -15,12 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import checked_kind
 from ..columns import packed_row
 from ..errors import BadOption
 from ..geometry import screw
 from ..geometry.pose import METERS_PER_RADIAN, PosePath
 from ..jit import kernel
-from ..ranges import check_choice, check_ranges
+from ..ranges import check_choice, check_range, check_ranges, ticks_of
 from ..robot.arm import Arm
 from .arm_arrays import ARM, PURSUIT, PURSUIT_STATE, arm_arrays, pose_and_jacobian
 from .controller import ControllerSettings, choose_sign, joint_velocity
@@ -191,7 +192,8 @@ class Pursuit:
         settings: settings of the pursuit.
 
     Raises:
-        BadOption: the gain of the controller is too large for dt.
+        WrongType: the arm or the path is none.
+        BadOption: dt is no positive number, or the gain of the controller is too large for it.
     """
 
     def __init__(
@@ -203,7 +205,8 @@ class Pursuit:
         controller: ControllerSettings | None = None,
         settings: PursuitSettings | None = None,
     ):
-        self.arm, self.path, self.dt = arm, path, dt
+        check_range("dt", dt, "(0, inf)")
+        self.arm, self.path, self.dt = checked_kind("arm", arm, Arm), checked_kind("path", path, PosePath), dt
         controller = controller or ControllerSettings()
         if not 0 < controller.gain * dt <= 1:
             raise BadOption("gain", f"gain * dt = {controller.gain * dt:g} is not in (0, 1]")
@@ -216,10 +219,13 @@ class Pursuit:
         return int(self._pursuit_state[PURSUIT_STATE.reference])
 
     def step(self, q: ArrayLike) -> tuple[int, np.ndarray]:
-        """Return the status (FOLLOWING, ARRIVED or STALLED) and joint speeds (dof,) at joints q (dof,)."""
-        qdot = np.empty(self.arm.dof)
-        q = np.ascontiguousarray(q, dtype=np.float64)
-        return pursue(self._work, self.path.dqs, q, self.dt, self._pursuit_state, qdot), qdot
+        """Return the status (FOLLOWING, ARRIVED or STALLED) and joint speeds (dof,) at joints q (dof,).
+
+        Raises:
+            WrongType, BadShape, NotFinite: q is not (dof,) finite numbers.
+        """
+        joints, qdot = self.arm.checked(q), np.empty(self.arm.dof)
+        return pursue(self._work, self.path.dqs, joints, self.dt, self._pursuit_state, qdot), qdot
 
     def roll_out(self, q: ArrayLike, max_seconds: float = 60.0) -> RollOut:
         """Follow the whole path with ideal tracking; the pursuit itself is unchanged.
@@ -227,9 +233,14 @@ class Pursuit:
         Args:
             q: (dof,) joints at the start.
             max_seconds: longest duration [s].
+
+        Raises:
+            WrongType, BadShape, NotFinite: q is not (dof,) finite numbers.
+            BadOption: the duration is negative, or has more than `MAX_TICKS` ticks.
         """
-        q = np.array(q, dtype=np.float64)
-        trace = np.empty((round(max_seconds / self.dt) + 1, self.arm.dof))
+        check_range("max_seconds", max_seconds, "[0, inf)")
+        q = self.arm.checked(q).copy()
+        trace = np.empty((ticks_of(max_seconds, self.dt) + 1, self.arm.dof))
         pursuit_state, qdot = fresh_pursuit_state(), np.empty(self.arm.dof)
         status, ticks, margin = _roll_out(self._work, self.path.dqs, q, self.dt, pursuit_state, qdot, trace)
         reason = {ARRIVED: "", STALLED: "ik_or_limit", FOLLOWING: "timeout"}[status]

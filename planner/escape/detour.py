@@ -77,8 +77,8 @@ def _root(slacks, blocked, enough):
 def _candidates(path, slacks, count, blocked, enough, most, places, poses):
     """Write indices and poses behind the blocked stretch where a detour may rejoin the path; returns their number.
 
-    The first is the first pose with enough slack, then come some later ones, in the end the last pose. If none has
-    enough slack, because the goal itself is close to an obstacle, clear poses are taken.
+    There is room for `most` of them. The first is the first pose with enough slack, then come some later ones, in the
+    end the last pose. If none has enough slack, because the goal itself is close to an obstacle, clear poses are taken.
     """
     for wanted in (enough, 0.0):
         size, step = 0, max(1, count // 10)
@@ -106,10 +106,12 @@ def _candidates(path, slacks, count, blocked, enough, most, places, poses):
 
 @inner
 def _branch(tree, row, poses):
-    """Write the poses from the root to a node, in order, into `poses`; returns their number."""
+    """Write the poses from the root to a node, in order, into `poses`; returns their number, -1 if they do not fit."""
     count, k = 0, row
     while k >= 0:
         count, k = count + 1, int(tree[k, NODE.parent])
+    if count > len(poses):
+        return -1
     k, place = row, count
     while k >= 0:
         place -= 1
@@ -143,7 +145,11 @@ def write_edge(out, count, x, y, spacing):
         spacing: largest path length [m] between poses.
     """
     distance, angle = screw.pose_distance(x, y)
-    steps = max(1, math.ceil(math.hypot(distance, 0.2 * angle) / spacing - 1e-9))
+    needed = math.hypot(distance, 0.2 * angle) / spacing - 1e-9
+    # written so that what is too large for an integer, or no number, does not fit either
+    if not needed <= len(out) - count:
+        return -1
+    steps = max(1, math.ceil(needed))
     if count + steps > len(out):
         return -1
     same = x[0] == y[0] and x[1] == y[1] and x[2] == y[2] and x[3] == y[3]
@@ -164,6 +170,8 @@ def _joined(path, count, root, branch, size, back, out, spacing):
         (number of poses, index of the pose where the branch rejoins the path); (-1, 0) if `out` is full.
     """
     at = 0
+    if root + 1 > len(out):
+        return -1, 0
     for k in range(root + 1):
         screw.store8(out, at, screw.load8(path, k))
         at += 1
@@ -220,13 +228,14 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
 
     Args:
         g: the tool among obstacles, see `edge_certificates.tool_arrays`.
-        path: (cap, 8) the path in its first `count` rows; replaced by the result.
+        path: (cap, 8) the path in its first `count` rows; replaced by the result. No more poses are written than the
+            shortest of `path`, `out` and `slacks` has room for.
         count: number of poses.
         out: (cap, 8) scratch.
         slacks: (cap,) scratch.
-        places: (c,) scratch.
+        places: (c,) scratch; no more candidates are written.
         poses: (c, 8) scratch.
-        branch: (b, 8) scratch.
+        branch: (b, 8) scratch, a pose for each level of a tree and one more.
         tree: see `tree_arrays.tree_arrays`; the last tree is left behind.
         cells: see `tree_arrays.tree_arrays`.
         heap: see `tree_arrays.tree_arrays`.
@@ -237,31 +246,37 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
     Returns:
         (status, number of poses, detours).
     """
+    room = min(len(path), len(out), len(slacks))
+    if not 0 < count <= room:
+        return TOO_LONG, 0, 0
     if tool_slack(g, screw.load8(path, 0), 1.0) < 0.0:
         return START_IN_COLLISION, count, 0
     if tool_slack(g, screw.load8(path, count - 1), 1.0) < 0.0:
         return GOAL_IN_COLLISION, count, 0
-    certain, enough = 0, _enough(options)
-    for detour in range(int(options[OPTION.rounds])):
+    certain, enough, most = 0, _enough(options), min(int(options[OPTION.candidates]), len(places), len(poses))
+    rounds = min(int(options[OPTION.rounds]), len(log))
+    for detour in range(rounds):
         blocked = first_blocked(g, path, count, certain, options)
         if blocked < 0:
             return (ESCAPED if detour else FREE), count, detour
         _slacks(g, path, count, slacks, enough)
         root = _root(slacks, blocked, enough)
-        size = _candidates(path, slacks, count, blocked, enough, int(options[OPTION.candidates]), places, poses)
+        size = _candidates(path, slacks, count, blocked, enough, most, places, poses)
         row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
         log[detour, DETOUR_LOG.tree_rows] = rows
         if row < 0:
             return (NODE_LIMIT if full else NO_ESCAPE), count, detour
-        length = _branch(tree, row, branch)
+        length = _branch(tree, row, branch[: len(branch) - 1])
+        if length < 0:
+            return TOO_LONG, 0, detour
         screw.store8(branch, length, screw.load8(poses, j))
         length += 1
         if options[OPTION.shortcut] == 1.0:
             length = _shortened(g, branch, length, options)
-        count, certain = _joined(path, count, root, branch, length, int(places[j]), out, options[OPTION.spacing])
+        count, certain = _joined(path, count, root, branch, length, int(places[j]), out[:room], options[OPTION.spacing])
         if count < 0:
             return TOO_LONG, 0, detour
         for k in range(count):
             screw.store8(path, k, screw.load8(out, k))
         log[detour, DETOUR_LOG.first], log[detour, DETOUR_LOG.last] = root, certain
-    return NO_ESCAPE, count, int(options[OPTION.rounds])
+    return NO_ESCAPE, count, rounds

@@ -13,12 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..collision.edge_certificates import tool_arrays
+from ..arrays import check_capacity, checked_array, checked_items, checked_kind
+from ..collision.edge_certificates import tool_arrays, tool_slack
 from ..columns import packed_row
-from ..errors import BadOption, BadShape
+from ..errors import BadOption
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle, pack
-from ..ranges import check_choice, check_range, check_ranges
+from ..ranges import check_choice, check_count, check_range, check_ranges
 from ..robot.body import TOOL_CAPSULE
 from .detour import (
     ESCAPED,
@@ -31,6 +32,7 @@ from .detour import (
     escape,
     last_tree,
 )
+from .tool_checks import checked_masks, checked_tool
 from .tree_arrays import DETOUR_LOG, NODE, OPTION, tree_arrays
 
 Corner = tuple[float, float, float]
@@ -82,7 +84,8 @@ class RepetSettings:
         spacing: path length [m] between the poses of a detour.
         bias: (3,) value of a metre in each world direction, in metres of path length.
         workspace: lowest and highest corner (2, 3) [m] of the nodes' positions, in the world.
-        longest: largest number of poses of a path.
+        longest: largest number of poses of a path. A planner takes longer paths at even steps of their length, see
+            `Plan.reduction`, and has room for as many poses again of blend and detours.
     """
 
     distance: float = 0.02
@@ -126,14 +129,15 @@ class RepetSettings:
             check_choice(name, getattr(self, name), known)
         check_ranges(self, "(0, inf)", "shell", "step", "grow", "shrink", "spacing", "turn", "cell")
         check_ranges(self, "[0, inf)", "distance", "away")
-        limits = {"levels": 100, "beam": 1000, "candidates": 100, "nodes": 10**6, "rounds": 100, "longest": 10**6}
+        check_range("beam", self.beam, "[1, 1000]")
+        limits = {"levels": 100, "candidates": 100, "nodes": 10**6, "rounds": 100, "longest": 10**6}
         for name, most in limits.items():
-            check_range(name, getattr(self, name), f"[1, {most}]")
+            check_count(name, getattr(self, name), f"[1, {most}]")
         check_ranges(self, "[0, 1000]", "retries", "random")
-        numbers = np.array([*self.bias, *self.workspace[0], *self.workspace[1]], dtype=np.float64)
-        if not np.isfinite(numbers).all():
-            raise BadOption("bias", f"or workspace: {self.bias}, {self.workspace} hold a number that is not finite")
-        if (np.array(self.workspace[0]) >= np.array(self.workspace[1])).any():
+        bias, workspace = checked_array("bias", self.bias, (3,)), checked_array("workspace", self.workspace, (2, 3))
+        object.__setattr__(self, "bias", tuple(bias.tolist()))
+        object.__setattr__(self, "workspace", tuple(map(tuple, workspace.tolist())))
+        if (workspace[0] >= workspace[1]).any():
             raise BadOption("workspace", f"the lowest corner {self.workspace[0]} is not below {self.workspace[1]}")
         if self.shell <= self.distance:
             raise BadOption("shell", f"{self.shell} is not above the distance to keep, {self.distance}")
@@ -195,6 +199,7 @@ class EscapeTree:
     @staticmethod
     def from_rows(rows: np.ndarray) -> EscapeTree:
         """Return the tree in the rows (n, 21) that the kernels leave behind."""
+        rows = checked_array("rows of a tree", rows, (None, NODE.width))
         poses, open_ = rows[:, NODE.pose : NODE.parent].copy(), rows[:, NODE.expanded] == 1.0
         origins = PosePath(poses).positions
         planes = []
@@ -238,22 +243,25 @@ def escape_path(
 
     Args:
         path: of the tcp in the world.
-        tool: (m, 7) capsules that move with the tcp, see `Body.tool`; `point_tool` for a ball.
+        tool: (m, 7) capsules that move with the tcp, see `Body.tool`; `point_tool` for a ball. At most
+            `MAX_CAPSULES`.
         obstacles: the obstacles as they are now.
         settings: see `RepetSettings`.
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
         seed: of the random children in retries; the same seed gives the same path.
 
     Raises:
-        BadShape: a tool that is not (m, 7) or not finite.
-        BadOption: too many obstacles or poses.
+        WrongType, BadShape, NotFinite: a path or obstacles of a wrong class, a tool that is not (m, 7) finite numbers.
+        BadOption: too many obstacles, poses or capsules, masks that fit neither them nor the obstacles, or a seed that
+            is no whole number.
     """
     settings = settings or RepetSettings()
-    tool = np.asarray(tool, dtype=np.float64)
-    if tool.ndim != 2 or tool.shape[1] != TOOL_CAPSULE.width or not np.isfinite(tool).all():
-        raise BadShape("tool", tool.shape, "(m, 7), finite")
-    if len(obstacles) > MAX_OBSTACLES:
-        raise BadOption("obstacles", f"there are {len(obstacles)}; allowed are {MAX_OBSTACLES}")
+    checked_kind("path", path, PosePath)
+    obstacles = checked_items("obstacles", obstacles, Obstacle)
+    check_capacity("obstacles", len(obstacles), MAX_OBSTACLES)
+    tool = checked_tool(tool)
+    masks = checked_masks(masks, len(tool), len(obstacles))
+    check_count("seed", seed, "(-inf, inf)")
     if len(path) > settings.longest:
         raise BadOption("path", f"has {len(path)} poses; allowed are {settings.longest}")
     work = tool_arrays(tool, pack(obstacles), masks=masks, margin=settings.distance)
@@ -292,7 +300,7 @@ def clear_of(pose: Pose, tool: np.ndarray, obstacles: Sequence[Obstacle]) -> flo
         tool: (m, 7) capsules, see `Body.tool`.
         obstacles: the obstacles.
     """
-    from ..collision.edge_certificates import tool_slack
-
+    checked_kind("pose", pose, Pose)
+    tool, obstacles = checked_tool(tool), checked_items("obstacles", obstacles, Obstacle)
     bare = [replace(obstacle, margin=None) for obstacle in obstacles]
     return float(tool_slack(tool_arrays(tool, pack(bare)), tuple(float(v) for v in pose.dq), 1.0))

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import broadcast_shape, checked_array, numbers
 from ..errors import BadShape, NotFinite, NotUnit
 from ..jit import kernel
 from . import screw
@@ -53,7 +54,7 @@ class ScrewParameters(NamedTuple):
 
 
 def _rows(name: str, value: ArrayLike, width: int) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    array = numbers(name, value)
     if array.ndim == 0 or array.shape[-1] != width:
         raise BadShape(name, array.shape, f"(..., {width})")
     return array
@@ -129,7 +130,7 @@ def identity() -> Array:
 def mul(a: ArrayLike, b: ArrayLike) -> Array:
     """See `screw.mul`; the arrays (..., 8) broadcast."""
     a, b = _rows("a", a, 8), _rows("b", b, 8)
-    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    shape = broadcast_shape("a and b", a.shape[:-1], b.shape[:-1])
     out = np.empty((math.prod(shape), 8))
     _mul_rows(_flat(a, shape, 8), _flat(b, shape, 8), out)
     return out.reshape(*shape, 8)
@@ -165,9 +166,8 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
         raise NotUnit(name, float(norms.flat[worst]))
     slant = np.abs(np.sum(array[..., :4] * array[..., 4:], axis=-1))
     if slant.size and slant.max() > UNIT_TOLERANCE * (1.0 + np.abs(array[..., 4:]).max()):
-        raise NotUnit(
-            f"{name}, whose dual part is not orthogonal to its primary part,", float(np.sqrt(1 + slant.max()))
-        )
+        what = f"{name}, whose dual part is not orthogonal to its primary part,"
+        raise NotUnit(what, float(np.sqrt(1 + slant.max())))
     off = (np.abs(norms - 1.0) > ON_MANIFOLD) | (slant > ON_MANIFOLD)
     return np.where(off[..., None], normalized(array), array) if off.any() else array
 
@@ -175,7 +175,7 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
 def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:
     """See `screw.from_pose`: (..., 8) of positions (..., 3) [m] and unit quaternions (..., 4) wxyz."""
     p, r = _rows("position", position, 3), _rows("quaternion", wxyz, 4)
-    shape = np.broadcast_shapes(p.shape[:-1], r.shape[:-1])
+    shape = broadcast_shape("position and quaternion", p.shape[:-1], r.shape[:-1])
     out = np.empty((math.prod(shape), 8))
     _from_pose_rows(_flat(p, shape, 3), _flat(r, shape, 4), out)
     return out.reshape(*shape, 8)
@@ -211,7 +211,9 @@ def exp(pure: ArrayLike) -> Array:
 
 def power(x: ArrayLike, tau: ArrayLike) -> Array:
     """See `sclerp`: x^tau (..., 8), the fraction tau of the shortest screw motion from the identity to x."""
-    return dq_from_twist(np.asarray(tau, dtype=np.float64)[..., None] * twist_from_dq(x))
+    twist, fraction = twist_from_dq(x), numbers("tau", tau)
+    broadcast_shape("x and tau", twist.shape[:-1], fraction.shape)
+    return dq_from_twist(fraction[..., None] * twist)
 
 
 def sclerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike, *, shortest: bool = True) -> Array:
@@ -225,8 +227,8 @@ def sclerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike, *, shortest: bool =
 
     Paper: section II-A (ScLERP). The "minimum length" it claims does not hold; the equivariance does.
     """
-    a, b, t = _rows("start", start, 8), _rows("end", end, 8), np.asarray(tau, dtype=np.float64)
-    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1], t.shape)
+    a, b, t = _rows("start", start, 8), _rows("end", end, 8), numbers("tau", tau)
+    shape = broadcast_shape("start, end and tau", a.shape[:-1], b.shape[:-1], t.shape)
     out = np.empty((math.prod(shape), 8))
     flat_tau = np.ascontiguousarray(np.broadcast_to(t, shape).reshape(-1))
     _sclerp_rows(_flat(a, shape, 8), _flat(b, shape, 8), flat_tau, shortest, out)
@@ -240,9 +242,7 @@ def is_half_turn(x: ArrayLike) -> Array:
 
 def screw_parameters(x: ArrayLike) -> ScrewParameters:
     """Return the screw of the shorter motion to a displacement (8,); a pure translation has angle 0 and no moment."""
-    twist = twist_from_dq(x)
-    if twist.shape != (6,):
-        raise BadShape("dual quaternion", np.shape(x), "(8,)")
+    twist = twist_from_dq(checked_array("dual quaternion", x, (8,)))
     v, omega = twist[:3], twist[3:]
     angle = float(np.linalg.norm(omega))
     if angle == 0.0:
@@ -276,7 +276,7 @@ def _hamilton(x: ArrayLike, sign: float) -> Array:
         s = sign
         return np.array([[w, -i, -j, -k], [i, w, -s * k, s * j], [j, s * k, w, -s * i], [k, -s * j, s * i, w]])
 
-    x = _rows("dual quaternion", x, 8)
+    x = checked_array("dual quaternion", x, (8,))
     out = np.zeros((8, 8))
     out[:4, :4] = out[4:, 4:] = block(*x[:4])
     out[4:, :4] = block(*x[4:])
@@ -308,7 +308,7 @@ def pose_distance(current: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:
 
 def continuous(path: ArrayLike) -> Array:
     """Return the path (n, 8) with signs flipped so that neighbors lie on the same side of the double cover."""
-    path = _rows("path", path, 8)
+    path = checked_array("path", path, (None, 8), finite=False)
     if len(path) < 2:
         return path.copy()
     turns = np.where(np.sum(path[1:, :4] * path[:-1, :4], axis=1) < 0.0, -1.0, 1.0)
@@ -321,9 +321,7 @@ def decoupled_lerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike) -> Array:
     Not a screw motion: the result depends on the choice of the tool frame. For comparison only.
     """
     start, end = _rows("start", start, 8), _rows("end", end, 8)
-    tau = np.asarray(tau, dtype=np.float64)
-    a, b = start.copy(), end.copy()
+    tau, a, b = numbers("tau", tau), start.copy(), end.copy()
     a[..., 4:], b[..., 4:] = 0.0, 0.0
-    p, q = translation(start), translation(end)
-    position = p + tau[..., None] * (q - p)
-    return from_position_quaternion(position, sclerp(a, b, tau)[..., :4])
+    turn, p, q = sclerp(a, b, tau)[..., :4], translation(start), translation(end)
+    return from_position_quaternion(p + tau[..., None] * (q - p), turn)

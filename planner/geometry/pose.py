@@ -9,18 +9,13 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import BadShape, NotFinite, NotUnit
+from ..arrays import checked_array, checked_kind, frozen, numbers
+from ..errors import BadShape, NotUnit
 from . import dualquat as dq
 
 METERS_PER_RADIAN = 0.2
 """Lever l [m/rad] of the weighted path length, which counts `sqrt(|dp|^2 + (l theta)^2)` [m] per step: a translation dp
 and a rotation by theta [rad]. "Path length" means this everywhere in the project."""
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    out = np.array(array, dtype=np.float64)
-    out.flags.writeable = False
-    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +32,7 @@ class Pose:
         value = dq.checked_unit(self.dq, "pose")
         if value.shape != (8,):
             raise BadShape("pose", value.shape, "(8,)")
-        object.__setattr__(self, "dq", _frozen(value))
+        object.__setattr__(self, "dq", frozen(value))
 
     @staticmethod
     def identity() -> Pose:
@@ -55,17 +50,16 @@ class Pose:
         Raises:
             NotUnit: the norm of the quaternion deviates from 1 by more than 1e-6.
         """
-        norm = float(np.linalg.norm(wxyz))
+        quaternion = numbers("quaternion", wxyz)
+        norm = float(np.linalg.norm(quaternion))
         if abs(norm - 1.0) > dq.UNIT_TOLERANCE:
             raise NotUnit("quaternion", norm)
-        return Pose(dq.from_position_quaternion(position, np.asarray(wxyz, dtype=np.float64) / norm))
+        return Pose(dq.from_position_quaternion(position, quaternion / norm))
 
     @staticmethod
     def from_vector(vector: ArrayLike) -> Pose:
         """Return the pose of a vector (7,): x y z [m], then quaternion wxyz."""
-        array = np.asarray(vector, dtype=np.float64)
-        if array.shape != (7,):
-            raise BadShape("pose vector", array.shape, "(7,)")
+        array = checked_array("pose vector", vector, (7,))
         return Pose.from_position_quaternion(array[:3], array[3:])
 
     @staticmethod
@@ -77,11 +71,7 @@ class Pose:
         """
         from scipy.spatial.transform import Rotation
 
-        array = np.asarray(matrix, dtype=np.float64)
-        if array.shape != (4, 4):
-            raise BadShape("matrix", array.shape, "(4, 4)")
-        if not np.isfinite(array).all():
-            raise NotFinite("matrix", tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0]))
+        array = checked_array("matrix", matrix, (4, 4))
         turn = array[:3, :3]
         if np.abs(turn @ turn.T - np.eye(3)).max() > dq.UNIT_TOLERANCE or np.linalg.det(turn) < 0:
             raise NotUnit("rotation part of the matrix", float(np.linalg.norm(turn, axis=1).max()))
@@ -155,7 +145,7 @@ class Pose:
 
     def __matmul__(self, other: Pose) -> Pose:
         """Compose two poses."""
-        return Pose(dq.mul(self.dq, other.dq))
+        return Pose(dq.mul(self.dq, checked_kind("other", other, Pose).dq))
 
     def distance_to(self, other: Pose) -> tuple[float, float]:
         """Return the distance of the origins [m] and the rotation angle [rad] to another pose."""
@@ -177,12 +167,12 @@ class PosePath:
         value = dq.checked_unit(self.dqs, "path")
         if value.ndim != 2 or len(value) == 0:
             raise BadShape("path", value.shape, "(n, 8) with n >= 1")
-        object.__setattr__(self, "dqs", _frozen(dq.continuous(value)))
+        object.__setattr__(self, "dqs", frozen(dq.continuous(value)))
 
     @staticmethod
     def from_vectors(vectors: ArrayLike) -> PosePath:
         """Return the path of pose vectors (n, 7): x y z [m], then unit quaternion wxyz."""
-        array = np.asarray(vectors, dtype=np.float64)
+        array = numbers("pose vectors", vectors)
         if array.ndim != 2 or array.shape[1] != 7:
             raise BadShape("pose vectors", array.shape, "(n, 7)")
         return PosePath(dq.from_position_quaternion(array[:, :3], array[:, 3:]))

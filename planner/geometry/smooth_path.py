@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import BadOption, BadShape
+from ..arrays import frozen, numbers
+from ..errors import BadOption, BadShape, NotFinite
 from ..jit import kernel
 from ..ranges import check_choice, check_range
 from . import dualquat as dq
@@ -80,14 +81,15 @@ class SmoothPath:
 
     def __post_init__(self):
         poses = PosePath(self.dqs).dqs
-        knots, twists = (np.array(value, dtype=np.float64) for value in (self.knots, self.twists))
+        knots, twists = frozen(numbers("knots", self.knots)), frozen(numbers("twists", self.twists))
         if len(poses) < 2:
             raise BadShape("path", poses.shape, "(n, 8) with n >= 2 different poses")
         _check_knots(knots, len(poses))
         if twists.shape != (len(poses), 6):
             raise BadShape("twists", twists.shape, f"({len(poses)}, 6)")
+        if not np.isfinite(twists).all():
+            raise NotFinite("twists", int(np.argwhere(~np.isfinite(twists))[0, 0]))
         for name, value in (("knots", knots), ("dqs", poses), ("twists", twists)):
-            value.flags.writeable = False
             object.__setattr__(self, name, value)
 
     def poses(self, u: ArrayLike) -> np.ndarray:
@@ -112,7 +114,7 @@ class SmoothPath:
 
     def _located(self, u: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return the segment (m,) and the fraction of the segment (m,) of parameters u (m,)."""
-        u = np.asarray(u, dtype=np.float64)
+        u = numbers("u", u)
         low, high = self.knots[[0, -1]]
         if u.ndim != 1:
             raise BadShape("u", u.shape, "(m,)")
@@ -144,7 +146,7 @@ def knots_of(path: PosePath, knots: str | ArrayLike = "length") -> np.ndarray:
         if knots not in ("length", "index"):
             raise BadOption("knots", f"{knots!r} is not one of length, index, nor an array")
         return path.lengths() if knots == "length" else np.arange(float(len(path)))
-    array = np.asarray(knots, dtype=np.float64)
+    array = numbers("knots", knots)
     _check_knots(array, len(path))
     return array
 

@@ -16,6 +16,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import checked_array
 from ..errors import BadOption, BadShape
 from ..geometry import dualquat as dq
 from ..geometry.pose import Pose, PosePath
@@ -149,7 +150,7 @@ def relative_jacobian(x_left: ArrayLike, j_left: ArrayLike, x_right: ArrayLike, 
         j_right: (6, nR) body Jacobian.
 
     Raises:
-        BadShape: a Jacobian that is not (6, n).
+        WrongType, BadShape, NotFinite: a pose that is not (8,), or a Jacobian that is not (6, n) finite numbers.
     """
     left = dq.hamilton_minus(x_right) @ dq.CONJUGATE_8 @ _pose_jacobian(x_left, j_left, "left Jacobian")
     right = dq.hamilton_plus(dq.conj(x_left)) @ _pose_jacobian(x_right, j_right, "right Jacobian")
@@ -168,7 +169,7 @@ def relative_twist_jacobian(x_left: ArrayLike, j_left: ArrayLike, x_right: Array
         j_right: (6, nR) body Jacobian.
 
     Raises:
-        BadShape: a Jacobian that is not (6, n).
+        WrongType, BadShape, NotFinite: a pose that is not (8,), or a Jacobian that is not (6, n) finite numbers.
     """
     jacobian = relative_jacobian(x_left, j_left, x_right, j_right)
     pure = 2.0 * dq.hamilton_plus(dq.mul(dq.conj(x_right), x_left)) @ jacobian
@@ -177,9 +178,7 @@ def relative_twist_jacobian(x_left: ArrayLike, j_left: ArrayLike, x_right: Array
 
 def _pose_jacobian(x: ArrayLike, body: ArrayLike, name: str) -> np.ndarray:
     """Return the derivative (8, n) of vec x: x times half the body twist of each joint."""
-    body = np.asarray(body, dtype=np.float64)
-    if body.ndim != 2 or len(body) != 6:
-        raise BadShape(name, body.shape, "(6, n)")
+    body = checked_array(name, body, (6, None))
     pure = np.zeros((8, body.shape[1]))
     pure[1:4], pure[5:8] = body[3:], body[:3]
     return 0.5 * dq.hamilton_plus(x) @ pure

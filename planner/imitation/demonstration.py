@@ -23,7 +23,9 @@ ROBOTS = {
     "Jaco": (7,),
     "XArm7": (7,),
 }
-"""Robots a demonstration may come from, with the allowed numbers of recorded joints: one or both arms of Baxter."""
+"""Numbers of recorded joints of well-known robots: one or both arms of Baxter. Other robots may have any number."""
+LONGEST_NAME = 100
+"""Largest number of characters of a robot's name."""
 FARTHEST = 10.0
 """Largest plausible coordinate [m]; larger positions are not in meters."""
 
@@ -58,7 +60,7 @@ class Demonstration:
     Attributes:
         name: for messages and reports.
         task: the demonstrated task ("stack"), "" if none.
-        robot: the robot that was recorded, one of `ROBOTS`.
+        robot: name of the robot that was recorded.
         tcp_frame: name of the frame recorded in `path`.
         source: "teleoperated", "kinesthetic" or "scripted".
         licence: of the data.
@@ -87,19 +89,22 @@ class Demonstration:
     object_sizes: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self):
-        if self.robot not in ROBOTS:
-            raise self._bad("robot", f"{self.robot!r} is unknown; known: {', '.join(ROBOTS)}")
+        name = self.robot
+        if not (isinstance(name, str) and name.strip() and name.isprintable() and len(name) <= LONGEST_NAME):
+            raise self._bad("robot", f"{str(name)[:LONGEST_NAME]!r} is not a name of 1 to {LONGEST_NAME} characters")
         if self.source not in SOURCES:
             raise self._bad("source", f"{self.source!r} is not one of {', '.join(SOURCES)}")
+        if not isinstance(self.path, PosePath):
+            raise self._bad("path", f"is a {type(self.path).__name__}, no PosePath")
         count = len(self.path)
         if count < 2:
             raise self._bad("path", f"has {count} sample; at least 2 are needed")
         for key, width in (("time", 1), ("joint_positions", 2), ("gripper", 1)):
             value = getattr(self, key)
-            if value is not None:
+            if value is not None or key == "time":
                 object.__setattr__(self, key, self._checked(key, value, count, width))
         joints = self.joint_positions
-        if joints is not None and joints.shape[1] not in ROBOTS[self.robot]:
+        if joints is not None and joints.shape[1] not in ROBOTS.get(self.robot, (joints.shape[1],)):
             allowed = " or ".join(str(number) for number in ROBOTS[self.robot])
             raise self._bad("joint_positions", f"has {joints.shape[1]} columns; the {self.robot} has {allowed} joints")
         steps = np.diff(self.time)
@@ -164,7 +169,10 @@ class Demonstration:
 
     def _numbers(self, key: str, value: Any) -> np.ndarray:
         """Return a float64 copy of an array of real numbers."""
-        array = np.asarray(value)
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            raise self._bad(key, "is not an array of real numbers, but ragged") from None
         if array.dtype.kind not in "fiu":
             raise self._bad(key, f"is not an array of real numbers, but of {array.dtype.name}")
         return array.astype(np.float64)

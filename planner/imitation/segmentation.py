@@ -13,6 +13,8 @@ DWELL_SPEED = 0.05
 """Fraction of the median speed below which the hand counts as resting."""
 DWELL_SECONDS = 0.3
 """Shortest duration of a rest [s]."""
+MAX_POSES = 1_000_000
+"""Number of poses beyond which a step is taken for a mistake."""
 SAME = 1e-9
 """Path length [m] below which two poses count as equal."""
 
@@ -51,7 +53,7 @@ def resampled(path: PosePath, step: float) -> PosePath:
         step: largest step [m] of path length.
 
     Raises:
-        BadOption: the step is not positive.
+        BadOption: the step is not positive, or so small that the path would have more than `MAX_POSES`.
     """
     check_range("step", step, "(0, inf]")
     lengths = path.lengths()
@@ -59,6 +61,8 @@ def resampled(path: PosePath, step: float) -> PosePath:
     poses, known = path.dqs[keep], lengths[keep]
     if len(poses) == 1:
         return PosePath(path.dqs[[0, -1]])
+    if known[-1] / step > MAX_POSES:
+        raise BadOption("step", f"{step:g} m would take {known[-1] / step:.3g} poses; allowed are {MAX_POSES}")
     wanted = np.linspace(0.0, known[-1], int(np.ceil(known[-1] / step)) + 1)
     left = np.clip(np.searchsorted(known, wanted, side="right") - 1, 0, len(known) - 2)
     tau = (wanted - known[left]) / (known[left + 1] - known[left])

@@ -13,7 +13,8 @@ import numpy as np
 from ..errors import BadOption
 from ..geometry import dualquat as dq
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
-from ..ranges import check_range
+from ..ranges import check_count, check_range
+from .segmentation import MAX_POSES
 
 STILL = 1e-9
 """Path length [m] up to which a path stands still: any motion is rounding."""
@@ -74,6 +75,26 @@ def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "len
     return min(max(index, 1), last)
 
 
+def imitated_share(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
+    """Return the share of an imitated path behind its guiding pose that another path contains, by path length.
+
+    Poses are compared bit by bit: followed poses are copies. Not in the paper.
+
+    Args:
+        imitated: (n, 8) poses of the imitated path.
+        path: (m, 8) poses of the other path.
+        guide: fraction of the imitated path before the guiding pose.
+    """
+    if len(imitated) < 2:
+        return 1.0
+    rows = {row.tobytes() for row in path}
+    there = np.array([row.tobytes() in rows for row in imitated])
+    whole = PosePath(imitated)
+    lengths = whole.lengths()
+    wanted = lengths[-1] - lengths[guide_index(whole, guide)]
+    return float(np.diff(lengths) @ (there[1:] & there[:-1]) / wanted) if wanted > 0.0 else 1.0
+
+
 def screw_path(start: Pose, end: Pose, step: float) -> PosePath:
     """Sample the screw from one pose to another, both included.
 
@@ -81,9 +102,15 @@ def screw_path(start: Pose, end: Pose, step: float) -> PosePath:
         start: first pose.
         end: last pose.
         step: largest path length [m] between neighbors.
+
+    Raises:
+        BadOption: the step is no positive number, or so small that the path would have more than `MAX_POSES`.
     """
+    check_range("step", step, "(0, inf]")
     twist = dq.twist_from_dq(dq.mul(dq.conj(start.dq), end.dq))
     length = math.hypot(np.linalg.norm(twist[:3]), METERS_PER_RADIAN * np.linalg.norm(twist[3:]))
+    if length / step > MAX_POSES:
+        raise BadOption("step", f"{step:g} m would take {length / step:.3g} poses; allowed are {MAX_POSES}")
     tau = np.linspace(0.0, 1.0, max(1, math.ceil(length / step)) + 1)
     poses = dq.sclerp(start.dq, end.dq, tau)
     poses[0], poses[-1] = start.dq, end.dq
@@ -97,7 +124,11 @@ def final_path(start: Pose, imitated: PosePath, guide: int) -> PosePath:
         start: present pose of the tcp.
         imitated: the imitated path.
         guide: index of the guiding pose in the imitated path.
+
+    Raises:
+        BadOption: there is no such pose.
     """
+    check_count("guide", guide, f"[0, {len(imitated) - 1}]")
     length = imitated.lengths()[-1]
     step = max(length / (len(imitated) - 1), LEAST_STEP) if length > STILL else BLEND_STEP
     blend = screw_path(start, imitated[guide], step)
@@ -111,10 +142,14 @@ def departure(demonstrated: PosePath, start: Pose, length: float) -> PosePath:
     Args:
         demonstrated: the segment whose beginning is imitated; `reversed()` of a segment gives the withdrawal.
         start: present pose of the tcp.
-        length: path length [m] of the beginning.
+        length: path length [m] of the beginning; infinite for all of it.
+
+    Raises:
+        BadOption: the length is negative or not a number.
 
     Not in the paper: goal-anchored imitation loses the lift and the withdrawal, and drags the held object.
     """
+    check_range("length", length, "[0, inf]")
     count = int(np.searchsorted(demonstrated.lengths(), length, side="right"))
     part = demonstrated[: max(1, count)]
     return part.moved(start @ demonstrated[0].inverse())

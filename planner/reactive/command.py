@@ -12,19 +12,26 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import BadOption
+from ..escape.detour import GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
+from ..planning.joint_space_motion import NO_CLEAR_POSTURE, NO_JOINT_PATH
+from ..planning.plan import WHY
 from ..planning.settings import PlanSettings
 from ..ranges import check_ranges
 
 FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
     "following", "escaping", "waiting", "blocked", "done", "failed",
 )  # fmt: skip
+BLOCKING = (
+    *(WHY[status] for status in (START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT)),
+    "start in collision", "goal in collision", NO_CLEAR_POSTURE, NO_JOINT_PATH,
+)  # fmt: skip
+"""Reasons of a failed plan that mean: an obstacle is in the way."""
 STATES = (FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED)
 
 
@@ -48,7 +55,8 @@ class ReactiveSettings:
 
     def __post_init__(self):
         check_ranges(self, "[0, 60)", "horizon", "lead")
-        if not 0 < self.patience <= self.give_up < math.inf:
+        check_ranges(self, "(0, inf)", "patience", "give_up")
+        if self.patience > self.give_up:
             raise BadOption("patience", f"need 0 < patience <= give_up, got {self.patience} and {self.give_up}")
 
 

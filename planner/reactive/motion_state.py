@@ -13,14 +13,21 @@ Waiting for something that moves to pass is part of PURSUING and DETOURING: see 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
 import numpy as np
 
-from ..control.pursuit import fresh_pursuit_state
+from ..control.pursuit import PursuitSettings, fresh_pursuit_state
 from ..geometry.pose import PosePath
 from ..planning.plan import NextMotion
+
+DECIDE = 0.2
+"""Seconds for which a decision to go on, to wait or to go round holds."""
+WAITS = (0.25, 0.5, 1.0)
+"""Waiting times that are compared, as parts of the horizon."""
+HELD_BACK = 0.1
+"""Share of the wanted speed below which an arm near a moving obstacle counts as waiting."""
 
 
 class Mode(Enum):
@@ -118,3 +125,16 @@ class MotionState:
             detail: its facts.
         """
         self.mode, self.reason, self.detail = Mode.FAILED, reason, detail
+
+
+def pursuit_of(settings: PursuitSettings, *, exact: bool) -> PursuitSettings:
+    """Return the settings of the pursuit in a motion, which waits as long as it takes: patience is the motion's.
+
+    Args:
+        settings: of the motion's plans.
+        exact: False: done as soon as the tool is within reach of the end.
+    """
+    if not exact:
+        radius = settings.capture_radius
+        settings = replace(settings, position_tolerance=radius, angle_tolerance=5.0 * radius)
+    return replace(settings, patience=1e9)

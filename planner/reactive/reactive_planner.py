@@ -14,33 +14,27 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import checked_kind
 from ..collision.step_certificates import near_pair_slack
 from ..control.arm_arrays import ARM, PURSUIT_STATE, arm_arrays
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..escape.repet import MAX_OBSTACLES
 from ..geometry.pose import Pose, PosePath, nearest
 from ..geometry.shapes import Obstacle, moves
+from ..imitation.reduction import reduced
 from ..planning.joint_space_motion import MAX_DEVIATION, path_deviation
-from ..planning.plan import NextMotion, Plan
+from ..planning.plan import NextMotion, Plan, check_success
 from ..planning.planner import Planner
-from ..planning.planning_scene import PlanningScene, SceneTemplate
+from ..planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..safety.guarded_pursuit import guarded_tick
+from ..safety.robot_checks import checked_contacts
 from ..safety.safety_layer import BLOCKED as UNSAFE
 from ..safety.safety_layer import FREE, safe_velocity
-from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
-from .motion_state import Mode, MotionState
+from .command import BLOCKED, BLOCKING, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
+from .motion_state import DECIDE, HELD_BACK, WAITS, Mode, MotionState, pursuit_of
 from .prediction import Predictor, is_preferable, same_scene, swept, windows
-
-BLOCKING = ("start in collision", "goal in collision", "no escape found", "node limit reached")
-"""Reasons of a failed plan that mean: an obstacle is in the way."""
-DECIDE = 0.2
-"""Seconds for which a decision to go on, to wait or to go round holds."""
-WAITS = (0.25, 0.5, 1.0)
-"""Waiting times that are compared, as parts of the horizon."""
-HELD_BACK = 0.1
-"""Share of the wanted speed below which an arm near a moving obstacle counts as waiting."""
 
 
 class ReactivePlanner:
@@ -53,10 +47,13 @@ class ReactivePlanner:
 
     Attributes:
         motion: the motion that is followed, or how it ended; None before `go` and after `stop`.
+
+    Raises:
+        WrongType, BadShape, NotFinite, BadOption, BadModel: any of its methods got something else than it takes.
     """
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings | None = None):
-        self.arm, self.settings = arm, settings or ReactiveSettings()
+        self.arm, self.settings = checked_kind("arm", arm, Arm), settings or ReactiveSettings()
         plan = self.settings.plan
         # a path to follow is already imitated: it is joined as early as possible
         early = replace(plan, motion=replace(plan.motion, guide=0.0, max_guide=0.3))
@@ -76,8 +73,8 @@ class ReactivePlanner:
 
     def hold(self, body: Body) -> None:
         """Use another body from now on: after an object was grasped or released."""
-        self.body = body
         self._planner.hold(body)
+        self.body = body
         self._quick.hold(body)
         plan = self.settings.plan
         self._template = SceneTemplate(self.arm, body, plan.safety, plan.motion.dt, guard=plan.guard)
@@ -92,8 +89,9 @@ class ReactivePlanner:
         """
         if obstacles is self._obstacles and allowed is self._allowed and not self._moving:
             return
-        changed = tuple(allowed) != self._allowed or not same_scene(self._obstacles, obstacles)
-        self._obstacles, self._allowed = tuple(obstacles), tuple(allowed)
+        obstacles, allowed = checked_obstacles(obstacles), checked_contacts(allowed)
+        changed = allowed != self._allowed or not same_scene(self._obstacles, obstacles)
+        self._obstacles, self._allowed = obstacles, allowed
         if changed:
             self._bind()
             if self.motion is not None:
@@ -107,17 +105,17 @@ class ReactivePlanner:
         """Follow a path to its end, joined from wherever the arm is.
 
         Args:
-            path: of the tcp.
+            path: of the tcp; of very long paths poses at even steps of their length, see `RepetSettings.longest`.
             exact: False: done as soon as the tool is within reach of the end.
             next_motion: the motion that follows: where there is a choice, the path ends in a posture that suits it.
             detours: False: along the path or not at all, without detour or search; where the safety layer leads away
                 from the path, the arm stands still, if it can.
         """
-        pursuit = self.settings.plan.motion.pursuit
-        if not exact:
-            radius = pursuit.capture_radius
-            pursuit = replace(pursuit, position_tolerance=radius, angle_tolerance=5.0 * radius)
-        packed = replace(pursuit, patience=1e9).packed()
+        checked_kind("path", path, PosePath)
+        if next_motion is not None:
+            checked_kind("next_motion", next_motion, NextMotion)
+        path = reduced(path, max(self.settings.plan.repet.longest, 2)).path
+        packed = pursuit_of(self.settings.plan.motion.pursuit, exact=exact).packed()
         self._work[ARM.pursuit, : len(packed)] = packed
         self.motion = MotionState(path, detours, next_motion, plan_now=bool(self._obstacles) and detours)
 
@@ -125,9 +123,10 @@ class ReactivePlanner:
         """Follow the path of a plan to its end.
 
         Args:
-            plan: a successful plan.
+            plan: a successful plan; a failed one has no path to follow and is refused by `PlanFailed`.
             exact: see `go`.
         """
+        check_success(plan, "follow")
         self.go(plan.path, exact=exact)
 
     def stop(self) -> None:
@@ -141,7 +140,7 @@ class ReactivePlanner:
 
     def step(self, q: ArrayLike) -> Command:
         """Return the command for joints q (dof,), as measured or as integrated from the commands."""
-        joints = np.ascontiguousarray(q, dtype=np.float64)
+        joints = self.arm.checked(q)
         motion = self.motion
         if motion is None or motion.over:
             return self._stand_still(joints)

@@ -44,6 +44,14 @@ def _add_column(g, row, first, c, p, normal, sign):
 
 
 @inner
+def _closest_point(g, k, c, t, point):
+    """Closest point of a near pair: on the hull of capsule c, or on its core."""
+    if g[k, NEAR_PAIR.exact] == 1.0:
+        return (g[k, point], g[k, point + 1], g[k, point + 2])
+    return _on_core(g, c, g[k, t])
+
+
+@inner
 def _on_core(g, c, t):
     a, b = end_a(g, ROW.placed + c), end_b(g, ROW.placed + c)
     return (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]))
@@ -61,9 +69,9 @@ def _lay_bounds(g, q):
         normal = (g[k, NEAR_PAIR.normal], g[k, NEAR_PAIR.normal + 1], g[k, NEAR_PAIR.normal + 2])
         i, j = int(g[k, NEAR_PAIR.capsule]), int(g[k, NEAR_PAIR.other])
         need = -alpha * (g[k, NEAR_PAIR.distance] - g[k, NEAR_PAIR.margin] - buffer)
-        _add_column(g, row, 0, i, _on_core(g, i, g[k, NEAR_PAIR.t]), normal, 1.0)
+        _add_column(g, row, 0, i, _closest_point(g, k, i, NEAR_PAIR.t, NEAR_PAIR.point), normal, 1.0)
         if g[k, NEAR_PAIR.self_pair] == 1.0:
-            _add_column(g, row, 0, j, _on_core(g, j, g[k, NEAR_PAIR.s]), normal, -1.0)
+            _add_column(g, row, 0, j, _closest_point(g, k, j, NEAR_PAIR.s, NEAR_PAIR.other_point), normal, -1.0)
         else:
             o, v = ROW.obstacles + j, OBSTACLE.velocity
             need += normal[0] * g[o, v] + normal[1] * g[o, v + 1] + normal[2] * g[o, v + 2]

@@ -9,25 +9,27 @@ obstacle approaches faster than the arm can retreat, the layer sends the best co
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import checked_array, checked_items, is_fit
 from ..collision.capsule_placement import place_capsules
 from ..collision.clearance import find_near, min_slack
 from ..collision.robot_arrays import HEADER, LAST_LOOK, ROW, SETTING, robot_arrays
 from ..collision.step_certificates import near_pair_slack, placed_step_stays_clear, reach_of, step_stays_clear
 from ..columns import packed_row
-from ..errors import BadOption, BadShape, UnknownName
+from ..errors import BadOption
 from ..geometry.shapes import Obstacle, pack
 from ..jit import inner, kernel
-from ..ranges import check_ranges
+from ..ranges import check_range, check_ranges
 from ..robot.arm import Arm
 from ..robot.body import Body
 from .barrier import clip_to_limits, constrain, exceeds_limits, scale_to_speeds
+from .robot_checks import check_bodies, checked_pairs, contact_masks
 
 FREE, CHANGED, HELD, BLOCKED = 0, 1, 2, 3
 """Status of a command: unchanged; changed by the bounds; shortened by the guard; the constraints are infeasible.
@@ -232,6 +234,12 @@ class SafetyLayer:
         settings: see `SafetySettings`.
         allowed: pairs of names (of a body's capsule or held object, of an obstacle) that may touch.
         pairs: capsules, counted through all bodies, that may hit each other; see `body_pairs`.
+
+    Raises:
+        WrongType, BadShape: an argument is of a wrong class or shape.
+        BadModel: a body does not belong to its arm.
+        BadOption: dt is no positive number, a pair names a capsule that there is not, or there are too many arms.
+        UnknownName: `allowed` names a part or an obstacle that does not exist.
     """
 
     def __init__(
@@ -245,9 +253,12 @@ class SafetyLayer:
         allowed: Sequence[tuple[str, str]] = (),
         pairs: Sequence[tuple[int, int]] = (),
     ):
+        check_range("dt", dt, "(0, inf)")
         self.settings, self.dt = settings or SafetySettings(), float(dt)
+        arms, bodies = checked_items("arms", arms, Arm), checked_items("bodies", bodies, Body)
+        check_bodies(arms, bodies)
+        obstacles = checked_items("obstacles", obstacles, Obstacle)
         self.joints = sum(arm.dof for arm in arms)
-        check_ranges(self, "(0, inf)", "dt")
         seen = [obstacle.at(self.settings.lead) for obstacle in obstacles]
         self.work = robot_arrays(
             arms,
@@ -255,7 +266,7 @@ class SafetyLayer:
             pack(seen),
             masks=contact_masks([name for body in bodies for name in body.names], obstacles, allowed),
             margin=self.settings.distance,
-            pairs=pairs,
+            pairs=checked_pairs(pairs, sum(len(body) for body in bodies)),
             settings=self.settings.packed(self.dt),
         )
 
@@ -267,39 +278,12 @@ class SafetyLayer:
             velocity: (n,) wanted joint speeds [rad/s or m/s]; speeds that are not finite count as 0.
 
         Raises:
-            BadShape: a wrong number of joints.
-            BadOption: joints that are not finite.
+            WrongType, BadShape, NotFinite: not (n,) numbers, or joints that are not finite.
         """
-        joints, wanted = self._checked("q", q), self._checked("velocity", velocity)
-        if not np.isfinite(joints).all():
-            raise BadOption("q", f"joint {int(np.argmin(np.isfinite(joints)))} is not finite")
+        shape = (self.joints,)
+        joints = q if is_fit(q, shape) else checked_array("safety: q", q, shape)
+        # a speed that is not finite counts as 0, see `safe_velocity`
+        wanted = checked_array("safety: velocity", velocity, shape, finite=False)
         out = np.empty(self.joints)
         status = safe_velocity(self.work, joints, wanted, self.dt, out)
         return Filtered(out, int(status), float(near_pair_slack(self.work, -1, 0.0)))
-
-    def _checked(self, name: str, value: ArrayLike) -> np.ndarray:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-        if array.shape != (self.joints,):
-            raise BadShape(f"safety: {name}", array.shape, f"({self.joints},)")
-        return array
-
-
-def contact_masks(names: Sequence[str], obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]]) -> list[int]:
-    """Return for every obstacle the capsules that may touch it, as bits of a number.
-
-    Args:
-        names: names of the capsules, counted through all bodies.
-        obstacles: the obstacles.
-        allowed: pairs of names (of a capsule, of an obstacle).
-
-    Raises:
-        UnknownName: no capsule or no obstacle has such a name.
-    """
-    known: Mapping[str, None] = dict.fromkeys(obstacle.name for obstacle in obstacles)
-    for capsule, obstacle in allowed:
-        if capsule not in names:
-            raise UnknownName("part of the body", capsule, dict.fromkeys(names))
-        if obstacle not in known:
-            raise UnknownName("obstacle", obstacle, known)
-    pairs = set(allowed)
-    return [sum(1 << k for k, name in enumerate(names) if (name, obstacle.name) in pairs) for obstacle in obstacles]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +18,7 @@ from onedemo.planner.collision.edge_certificates import is_clear, place_tool, po
 from onedemo.planner.collision.edge_certificates import screw_is_clear as screw_clear
 from onedemo.planner.collision.robot_arrays import PLACED, ROW
 from onedemo.planner.errors import BadOption, BadShape, NotFinite, OneDemoError
-from onedemo.planner.escape.detour import first_blocked
+from onedemo.planner.escape.detour import TOO_LONG, escape, first_blocked
 from onedemo.planner.escape.escape_tree import expand
 from onedemo.planner.escape.repet import (
     MAX_OBSTACLES,
@@ -29,7 +30,7 @@ from onedemo.planner.escape.repet import (
     escape_path,
     point_tool,
 )
-from onedemo.planner.escape.tree_arrays import NODE, OPTION
+from onedemo.planner.escape.tree_arrays import NODE, OPTION, tree_arrays
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry import screw
 from onedemo.planner.geometry.pose import Pose, PosePath
@@ -685,9 +686,14 @@ def test_one_pose_is_a_path():
 def test_what_is_not_a_number_is_refused():
     with pytest.raises(OneDemoError):
         PosePath(np.full((2, 8), np.nan))
-    for tool in (np.full((1, 7), np.nan), np.zeros((1, 6)), np.zeros(7)):
-        with pytest.raises(BadShape):
+    for tool, error in ((np.full((1, 7), np.nan), NotFinite), (np.zeros((1, 6)), BadShape), (np.zeros(7), BadShape)):
+        with pytest.raises(error, match="tool"):
             escape_path(ALONG, tool, [])
+    for masks in ([0, 0], [2], [-1]):
+        with pytest.raises(BadOption, match="masks"):
+            escape_path(ALONG, BALL, [Obstacle(Sphere(0.05))], masks=masks)
+    with pytest.raises(BadOption, match="capsules of the tool': there are 100"):
+        escape_path(ALONG, np.tile(BALL, (100, 1)), [])
     with pytest.raises(NotFinite):
         Obstacle(Sphere(0.1), velocity=np.array([np.nan, 0, 0]))
     with pytest.raises(BadOption, match="has 61 poses; allowed are 10"):
@@ -738,3 +744,26 @@ def test_children_far_off_the_plane_are_proven_clear_too():
     kept = [row for row in tree[1:count] if row[NODE.verdict] == KEPT]
     assert len(kept) > 10 and count - 1 - len(kept) > 5
     assert all(is_clear(g, x, tuple(row[:8].tolist()), 0.01) for row in kept)
+
+
+def test_no_more_poses_are_written_than_there_is_room_for():
+    """Of every array the last row, which the kernel is not given, stays what it was."""
+    settings, rows = RepetSettings(), len(ALONG) + 3
+    wall = [Obstacle(Sphere(0.06), at([0.0, 0.0, 0.0]))]
+    for spacing in (0.01, 1e-9, 1e-300):
+        path, out, slacks = np.full((rows + 1, 8), 7.0), np.full((rows + 1, 8), 7.0), np.full(rows + 1, 7.0)
+        places, poses, branch = np.full(6, 7.0), np.full((6, 8), 7.0), np.full((settings.levels + 4, 8), 7.0)
+        path[: len(ALONG)] = ALONG.dqs
+        tree, cells, heap = tree_arrays(settings.nodes, settings.levels)
+        options = replace(settings, spacing=spacing).packed()
+        status, count, _ = escape(
+            tool_arrays(BALL, pack(wall), margin=settings.distance), path[:-1], len(ALONG), out[:-1], slacks[:-1],
+            places[:-1], poses[:-1], branch[:-1], tree, cells, heap, options, np.ones(1), np.zeros((10, 3)),
+        )  # fmt: skip
+        assert (status, count) == (TOO_LONG, 0)
+        for array in (path, out, slacks, places, poses, branch):
+            assert (array[-1] == 7.0).all()
+    assert escape(
+        tool_arrays(BALL, pack(wall)), path[:3], 4, out, slacks, places, poses, branch, tree, cells, heap, options,
+        np.ones(1), np.zeros((10, 3)),
+    )[0] == TOO_LONG  # fmt: skip

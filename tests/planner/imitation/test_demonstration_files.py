@@ -65,7 +65,8 @@ BAD = {
     "shorter joints": (replace("joint_positions", lambda a: a["joint_positions"][:9]), "joint_positions: has shape"),
     "text as time": (replace("time", lambda a: a["time"].astype(str)), "time: is not an array of numbers"),
     "complex poses": (replace("poses", lambda a: a["poses"] + 0j), "poses: is not an array of numbers"),
-    "unknown robot": (replace("robot", "R2D2"), "robot: 'R2D2' is unknown; known: Panda, .*"),
+    "nameless robot": (replace("robot", " "), "robot: ' ' is not a name of 1 to 100 characters"),
+    "robot in two lines": (replace("robot", "R2\nD2"), r"robot: 'R2\\nD2' is not a name"),
     "unknown source": (replace("source", "dreamt"), "source: 'dreamt' is not one of teleoperated, kinesthetic"),
     "wrong units": (replace("units", "cm s deg xyzw"), "units: must be 'm s rad wxyz'; convert with"),
     "number as name": (replace("name", 3), "name: is not a text"),
@@ -159,6 +160,8 @@ def test_names_need_no_sizes_and_another_robot_may_be_the_teacher():
     demo = read_demonstration(shipped_demonstration("stack"))
     assert dataclasses.replace(demo, object_sizes={}).segments[0].reference == "cubeA"
     six = dataclasses.replace(demo, robot="UR5e", joint_positions=demo.joint_positions[:, :6])
+    for robot in ("UR10", "our own arm, 2nd"):
+        assert dataclasses.replace(six, robot=robot).robot == robot
     assert six.robot == "UR5e"
     assert not demo.object_sizes["cubeA"].flags.writeable
 

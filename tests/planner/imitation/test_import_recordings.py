@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.arms import table_panda
 from helpers.strategies import assert_same_pose, random_path
 
 from onedemo.bench.cli import main
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.envs import ROBOTS
-from onedemo.envs.scene.scene import robot_arm
 from onedemo.planner.errors import BadDemonstration, OneDemoError
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.imitation.demonstration_files import read_demonstration
@@ -83,16 +82,16 @@ def at(array, index, value):
 def test_bad_teleoperations_are_named_with_file_and_index(key, change, message, tmp_path):
     path, arrays = tmp_path / "raw.npz", teleoperation()
     np.savez(path, **arrays)
-    assert len(stack_from_teleoperation(path, robot_arm(ROBOTS["Panda"]), name="x", licence="y").segments) == 2
+    assert len(stack_from_teleoperation(path, table_panda()[0], name="x", licence="y").segments) == 2
     np.savez(path, **{**arrays, key: change(arrays[key])})
     with pytest.raises(BadDemonstration, match=message) as caught:
-        stack_from_teleoperation(path, robot_arm(ROBOTS["Panda"]), name="x", licence="y")
+        stack_from_teleoperation(path, table_panda()[0], name="x", licence="y")
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
 
 
 def test_the_recorded_joints_give_the_recorded_path():
-    demo, arm = read_demonstration(shipped_demonstration("stack")), robot_arm(ROBOTS["Panda"])
+    demo, arm = read_demonstration(shipped_demonstration("stack")), table_panda()[0]
     for k in range(0, len(demo.path), 25):
         distance, angle = arm.fk(demo.joint_positions[k]).distance_to(demo.path[k])
         assert distance < 1e-9
@@ -147,7 +146,6 @@ def test_tables_of_poses_become_demonstrations_cut_where_the_hand_rests(made, re
         ({"quaternion": "zyxw"}, "unknown quaternion order 'zyxw'; known: wxyz, xyzw"),
         ({"rate": 0.0}, "rate: 0.0 is not a positive number"),
         ({"rate": np.nan}, "rate: nan is not"),
-        ({"robot": "HAL"}, "robot: 'HAL' is unknown"),
         ({"source": "dreamt"}, "source: 'dreamt'"),
     ],
 )

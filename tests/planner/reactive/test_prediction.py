@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.arms import table_panda
 from helpers.random_scenes import at, base_gap
 
-from onedemo.envs import ROBOTS
-from onedemo.envs.scene.robot_bodies import robot_body
-from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.control.arm_arrays import arm_arrays
 from onedemo.planner.geometry.pose import Pose
@@ -33,7 +31,7 @@ SHOULDER = 0.3
 
 
 def robot():
-    return compiled_scene(ROBOTS["Panda"]).arms[0].arm, robot_body(ROBOTS["Panda"])
+    return table_panda()[:2]
 
 
 def sideways():

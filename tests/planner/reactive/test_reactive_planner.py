@@ -6,16 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.arms import table_panda
 
-from onedemo.envs import ROBOTS
-from onedemo.envs.scene.robot_bodies import robot_body
-from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.collision.clearance import slack_at
-from onedemo.planner.errors import BadOption
+from onedemo.planner.errors import BadModel, BadOption, PlanFailed
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.planning.joint_space_motion import MAX_DEVIATION, path_deviation
+from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.reactive.command import (
     BLOCKED,
@@ -28,13 +27,14 @@ from onedemo.planner.reactive.command import (
     ReactiveSettings,
 )
 from onedemo.planner.reactive.reactive_planner import ReactivePlanner
+from onedemo.planner.robot.body import Body
 
 DT = 0.02
 START = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
 
 
 def robot():
-    return compiled_scene(ROBOTS["Panda"]).arms[0].arm, robot_body(ROBOTS["Panda"])
+    return table_panda()[:2]
 
 
 def sideways(way=0.35):
@@ -240,3 +240,29 @@ def test_what_stands_still_at_the_goal_is_given_up_at_the_first_stall():
     states, rooms, _, planner = followed(path, lambda k: things, ticks=3000)
     assert states[-1] == FAILED and planner.motion.reason == "blocked" and rooms.min() >= -1e-9
     assert len(states) * DT < 10.0
+
+
+def test_a_failed_plan_is_not_followed():
+    arm, body = robot()
+    planner = ReactivePlanner(arm, body)
+    failed = Planner(arm, body).plan(sideways(), START, Pose.from_position_quaternion([5.0, 0.0, 0.0]))
+    with pytest.raises(PlanFailed, match=r"there is no plan to follow: ik_or_limit: the goal is"):
+        planner.follow(failed)
+    assert planner.motion is None
+
+
+def test_a_body_of_another_arm_is_refused_and_the_old_one_kept():
+    arm, body = robot()
+    planner = ReactivePlanner(arm, body)
+    foreign = Body(np.array([[9.0, 0, 0, 0, 0, 0, 0, 0.01]]), ("hand",))
+    with pytest.raises(BadModel, match="moves with joint 9"):
+        planner.hold(foreign)
+    assert planner.body is body
+
+
+def test_very_long_paths_are_followed_at_even_steps():
+    arm, body = robot()
+    planner, start = ReactivePlanner(arm, body), arm.fk(START)
+    long = screw_path(start, Pose.from_position_quaternion([0.0, 0.1, 0.0]) @ start, 2e-5)
+    planner.go(long)
+    assert len(long) > 4000 and len(planner.path) == 4000
