@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import BadModel, BadShape, NotFinite
+from ..arrays import checked_array, checked_kind, frozen, is_fit, numbers
+from ..errors import BadModel, BadShape
 from ..geometry.pose import Pose
-from .chain_readers import ChainData, chain_from_mujoco, chain_from_urdf
+from ..models.model_report import ModelReport
+from .chain_readers import ChainData, ChainRequest, chain_from_mujoco, chain_from_urdf
 from .kinematics import CHAIN, FRAME, forward_into, forward_jacobian_into
 
 MAX_DOF = 16
-
-
-def _readonly(array: ArrayLike) -> np.ndarray:
-    out = np.array(array, dtype=np.float64)
-    out.flags.writeable = False
-    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +31,7 @@ class Arm:
         lower: (dof,) lower joint limits [rad or m]; -inf for a continuous joint.
         upper: (dof,) upper joint limits [rad or m].
         velocity_limits: (dof,) largest joint speeds [rad/s or m/s].
+        report: findings of the reader of its model: which joints are held, and what was not used.
 
     Raises:
         BadModel: no joints, too many, limits out of order, or numbers that are not finite.
@@ -47,6 +44,7 @@ class Arm:
     lower: np.ndarray
     upper: np.ndarray
     velocity_limits: np.ndarray
+    report: ModelReport = field(default_factory=ModelReport)
 
     def __post_init__(self):
         dof = len(self.joint_names)
@@ -54,7 +52,7 @@ class Arm:
             raise BadModel(self.name, "joints", f"has {dof}; allowed are 1 to {MAX_DOF}")
         shapes = {"chain": (dof + 1, CHAIN.width), "lower": (dof,), "upper": (dof,), "velocity_limits": (dof,)}
         for key, shape in shapes.items():
-            value = _readonly(getattr(self, key))
+            value = frozen(numbers(f"{self.name}: {key}", getattr(self, key)))
             if value.shape != shape:
                 raise BadShape(f"{self.name}: {key}", value.shape, str(shape))
             object.__setattr__(self, key, value)
@@ -64,7 +62,8 @@ class Arm:
             if not low < high:
                 raise BadModel(self.name, name, f"lower limit {low:g} is not below upper limit {high:g}")
             if not 0 < speed < np.inf:
-                raise BadModel(self.name, name, f"velocity limit {speed:g} is not a positive number")
+                reason = f"velocity limit {speed:g} is not a positive number; velocity_limits takes others"
+                raise BadModel(self.name, name, reason)
 
     @property
     def dof(self) -> int:
@@ -94,6 +93,7 @@ class Arm:
 
     def with_tool(self, tcp_from_tool: Pose) -> Arm:
         """Return the arm with another frame of the hand as its tcp."""
+        checked_kind("tcp_from_tool", tcp_from_tool, Pose)
         row = self.chain[-1]
         tcp = Pose.from_position_quaternion(row[CHAIN.offset : CHAIN.kind], row[CHAIN.rotation : CHAIN.offset])
         tool = tcp @ tcp_from_tool
@@ -102,44 +102,52 @@ class Arm:
 
     def margin(self, q: ArrayLike) -> float:
         """Return the smallest distance [rad or m] of q (dof,) to a joint limit; negative outside."""
-        q = np.asarray(q, dtype=np.float64)
+        q = self.checked(q)
         return float(np.minimum(q - self.lower, self.upper - q).min())
 
     def checked(self, q: ArrayLike) -> np.ndarray:
-        """Return joint positions (dof,) as float64.
+        """Return joint positions (dof,) as the kernels take them.
 
         Raises:
-            BadShape, NotFinite: another shape, or a number that is not finite.
+            WrongType, BadShape, NotFinite: no numbers, another shape, or a number that is not finite.
         """
-        q = np.asarray(q, dtype=np.float64)
-        if q.shape != (self.dof,):
-            raise BadShape(f"{self.name}: q", q.shape, f"({self.dof},)")
-        if not np.isfinite(q).all():
-            raise NotFinite(f"{self.name}: q", int(np.argmin(np.isfinite(q))))
-        return q
+        shape = self.lower.shape
+        return q if is_fit(q, shape) else checked_array(f"{self.name}: q", q, shape)
 
     @staticmethod
     def from_mujoco(
         model: Any,
-        joint_names: Sequence[str],
+        joint_names: Sequence[str] | None = None,
         *,
-        site: str,
+        site: str | None = None,
+        body: str | None = None,
         velocity_limits: ArrayLike,
+        locked: Mapping[str, float] | None = None,
+        base_link: str | None = None,
         name: str = "mujoco arm",
     ) -> Arm:
-        """Read the chain from the world to a site of a compiled MuJoCo model.
+        """Read the chain from the world to a site or a body of a compiled MuJoCo model.
 
         Args:
             model: `mujoco.MjModel`; MuJoCo itself is not imported.
-            joint_names: all moving joints between the world and the site, from the base on.
-            site: name of the tool frame.
+            joint_names: all joints between the world and the tool that are not held, from the base on; default: those
+                of the model.
+            site: name of the tool frame, if it is a site.
+            body: name of the tool frame, if it is that of a body.
             velocity_limits: (dof,) or scalar [rad/s or m/s]: MJCF does not contain velocity limits.
+            locked: position [rad or m] of each joint to hold, by name or shell pattern like "head_*"; 0 for a free or
+                ball joint, which stays where the model has it.
+            base_link: body where the arm begins: joints before it are held at their reference, or as `locked` says.
             name: for messages.
 
         Raises:
-            BadModel: unknown joints or site, or a model that is no such chain.
+            BadModel: unknown joints, site or body, or a model that is no such chain.
         """
-        return Arm._from_data(name, chain_from_mujoco(model, joint_names, site, name), velocity_limits)
+        given = [(kind, value) for kind, value in (("site", site), ("body", body)) if value is not None]
+        if len(given) != 1:
+            raise BadModel(name, "tool frame", "give either a site or a body")
+        request = ChainRequest(locked or {}, base_link, name)
+        return Arm._from_data(name, chain_from_mujoco(model, joint_names, given[0], request), velocity_limits)
 
     @staticmethod
     def from_urdf(
@@ -148,25 +156,35 @@ class Arm:
         tcp_frame: str,
         world_from_base: Pose | None = None,
         velocity_limits: ArrayLike | None = None,
+        locked: Mapping[str, float] | None = None,
+        base_link: str | None = None,
         name: str | None = None,
     ) -> Arm:
         """Read the chain from the base to a frame of a URDF file, with Pinocchio.
 
         Args:
             path: URDF file; meshes are not read.
-            tcp_frame: name of a link or joint frame: the tool frame.
+            tcp_frame: name of the tool frame: a link, or else a joint.
             world_from_base: pose of the root link; default: the identity.
             velocity_limits: (dof,) or scalar [rad/s or m/s]; default: those of the file.
+            locked: position [rad or m] of each joint to hold, by name or shell pattern like "head_*"; 0 for a floating
+                or planar joint, which stays where the file has it.
+            base_link: link where the arm begins: joints before it are held at 0, or as `locked` says.
             name: for messages; default: the file name.
 
         Raises:
             BadModel: no such file or frame, or a model that is no such chain.
         """
-        data = chain_from_urdf(path, tcp_frame, world_from_base)
+        data = chain_from_urdf(path, tcp_frame, ChainRequest(locked or {}, base_link, str(path)), world_from_base)
         return Arm._from_data(name or Path(path).name, data, velocity_limits)
 
     @staticmethod
     def _from_data(name: str, data: ChainData, velocity_limits: ArrayLike | None) -> Arm:
-        speeds = data.velocity if velocity_limits is None else np.asarray(velocity_limits, dtype=np.float64)
-        speeds = np.broadcast_to(speeds, len(data.joint_names))
-        return Arm(name, data.joint_names, data.chain, data.lower, data.upper, speeds)
+        count, speeds = len(data.joint_names), data.velocity
+        if velocity_limits is not None:
+            speeds = numbers(f"{name}: velocity_limits", velocity_limits)
+        if speeds.shape not in ((), (1,), (count,)):
+            raise BadShape(f"{name}: velocity_limits", speeds.shape, f"({count},) or a scalar")
+        data.report.warn(stacklevel=3)
+        speeds = np.broadcast_to(speeds, count)
+        return Arm(name, data.joint_names, data.chain, data.lower, data.upper, speeds, data.report)

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import BadModel
 from ..geometry.pose import Pose
+from ..models.doubtful_limits import check_limits, doubtful_limits
+from ..models.model_joints import OTHER, SLIDES, ModelJoint, check_independent, held_positions
+from ..models.model_report import SHOWN, ModelReport, listed
+from ..models.mujoco_model import (
+    geoms_of,
+    mujoco_bodies,
+    mujoco_couplings,
+    mujoco_id,
+    mujoco_joint_names,
+    mujoco_joints,
+    mujoco_loops,
+    mujoco_pose,
+    solid_geoms,
+    unused_of_mujoco,
+)
+from ..models.urdf_model import UrdfModel, read_urdf
 from .kinematics import PRISMATIC, REVOLUTE
 
 FARTHEST = 100.0
@@ -26,6 +41,7 @@ class ChainData(NamedTuple):
         lower: (dof,) [rad or m], -inf for a continuous joint.
         upper: (dof,) [rad or m].
         velocity: (dof,) [rad/s or m/s], NaN where the model lacks a limit.
+        report: findings of the reader.
     """
 
     joint_names: tuple[str, ...]
@@ -33,6 +49,21 @@ class ChainData(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     velocity: np.ndarray
+    report: ModelReport
+
+
+class ChainRequest(NamedTuple):
+    """Request for a chain of a model.
+
+    Attributes:
+        locked: position of each joint to hold [rad or m], by name or shell pattern.
+        base_link: link, or body, before which all joints are held; None: the root.
+        source: name of the model for messages.
+    """
+
+    locked: Mapping[str, float]
+    base_link: str | None
+    source: str
 
 
 class _ChainBuilder:
@@ -41,22 +72,34 @@ class _ChainBuilder:
     def __init__(self):
         self._rows: list[np.ndarray] = []
         self._pending = Pose.identity()
+        self.joints: list[ModelJoint] = []
 
     def move(self, displacement: Pose) -> None:
         self._pending = self._pending @ displacement
 
-    def add_joint(self, axis: ArrayLike, position: ArrayLike, kind: float, rest: float) -> None:
-        """Append a joint along `axis` through `position`; at q = rest its displacement is zero."""
-        turn = turn_z_to(np.asarray(axis, dtype=np.float64))
-        body_from_joint = Pose.from_position_quaternion(position, turn)
-        back = Pose.from_yaw([0, 0, 0], -rest)
+    def add_joint(self, joint: ModelJoint, source: str) -> None:
+        """Append a joint; at rest its displacement is zero."""
+        if joint.kind == OTHER:
+            raise BadModel(
+                source, f"joint {joint.name!r}", "is neither a hinge nor a slide; base_link or locked holds it"
+            )
+        if not np.isfinite(joint.axis).all():
+            raise BadModel(source, f"joint {joint.name!r}", "its axis is not a direction")
+        kind = PRISMATIC if joint.kind == SLIDES else REVOLUTE
+        body_from_joint = Pose.from_position_quaternion(joint.position, turn_z_to(joint.axis))
+        back = Pose.from_yaw([0, 0, 0], -joint.rest)
         if kind == PRISMATIC:
-            back = Pose.from_position_quaternion([0, 0, -rest])
+            back = Pose.from_position_quaternion([0, 0, -joint.rest])
         self._rows.append(self._row(self._pending @ body_from_joint, kind))
         self._pending = back @ body_from_joint.inverse()
+        self.joints.append(joint)
 
-    def chain(self) -> np.ndarray:
-        return np.array([*self._rows, self._row(self._pending, REVOLUTE)])
+    def data(self, velocity: np.ndarray, report: ModelReport) -> ChainData:
+        check_limits(self.joints, report.source)
+        rows = np.array([*self._rows, self._row(self._pending, REVOLUTE)])
+        names = tuple(joint.name for joint in self.joints)
+        low, high = (np.array([getattr(joint, end) for joint in self.joints]) for end in ("low", "high"))
+        return ChainData(names, rows, low, high, velocity, report)
 
     @staticmethod
     def _row(pose: Pose, kind: float) -> np.ndarray:
@@ -72,178 +115,143 @@ def turn_z_to(axis: np.ndarray) -> np.ndarray:
     return r / np.linalg.norm(r)
 
 
-def chain_from_mujoco(model: Any, joint_names: Sequence[str], site: str, source: str) -> ChainData:
-    """Read the chain from the world to a site of a compiled model.
+def chain_from_mujoco(
+    model: Any, joint_names: Sequence[str] | None, tool: tuple[str, str], request: ChainRequest
+) -> ChainData:
+    """Read the chain from the world to a site or a body of a compiled model.
 
     Args:
         model: `mujoco.MjModel`, read by its named fields.
-        joint_names: all moving joints between the world and the site, from the base on.
-        site: name of the tool frame.
-        source: name of the model for messages.
+        joint_names: the joints between the world and the tool that are not held, from the base on; None: all of them.
+        tool: kind, "site" or "body", and name of the tool frame.
+        request: joints to hold.
 
     Raises:
-        BadModel: the joints are not exactly the moving joints between the world and the site, or the site is unknown.
+        BadModel: the joints are not exactly the moving joints between the world and the tool, one of them follows
+            another one, or a name is unknown.
     """
-    site_id = mujoco_id(model, "site", site, source)
-    wanted = [mujoco_id(model, "joint", joint, source) for joint in joint_names]
-    builder, found = _ChainBuilder(), []
-    for body in mujoco_bodies(model, int(model.site_bodyid[site_id])):
+    source = request.source
+    tool_id = mujoco_id(model, *tool, source)
+    last = tool_id if tool[0] == "body" else int(model.site_bodyid[tool_id])
+    path, joints, names = mujoco_bodies(model, last), mujoco_joints(model), mujoco_joint_names(model)
+    for name in joint_names or ():
+        mujoco_id(model, "joint", name, source)
+    before: list[str] = []
+    if request.base_link is not None:
+        base = mujoco_id(model, "body", request.base_link, source)
+        _check_base(base == 0 or base in path, request, tool[1])
+        before = [names[joint] for body in mujoco_bodies(model, base) for joint in _joints_of(model, body)]
+    couplings = mujoco_couplings(model)
+    held = held_positions(joints, couplings, request.locked, before, joint_names or (), source)
+    check_independent([names[j] for body in path for j in _joints_of(model, body)], couplings, held, source)
+    builder = _ChainBuilder()
+    for body in path:
         builder.move(mujoco_pose(model.body_pos[body], model.body_quat[body]))
-        first = int(model.body_jntadr[body])
-        for joint in range(first, first + int(model.body_jntnum[body])):
-            # mjJNT_SLIDE and mjJNT_HINGE
-            kind = {2: PRISMATIC, 3: REVOLUTE}.get(int(model.jnt_type[joint]))
-            if kind is None:
-                raise BadModel(source, model.joint(joint).name, "is neither a hinge nor a slide")
-            rest = float(model.qpos0[model.jnt_qposadr[joint]])
-            builder.add_joint(model.jnt_axis[joint], model.jnt_pos[joint], kind, rest)
-            found.append(joint)
-    if found != wanted:
-        known = ", ".join(model.joint(joint).name for joint in found)
-        raise BadModel(source, "joint names", f"the joints from the world to {site!r} are: {known}")
-    builder.move(mujoco_pose(model.site_pos[site_id], model.site_quat[site_id]))
-    limited = model.jnt_limited[wanted].astype(bool)
-    lower, upper = model.jnt_range[wanted].T
-    return ChainData(
-        tuple(joint_names),
-        builder.chain(),
-        np.where(limited, lower, -np.inf),
-        np.where(limited, upper, np.inf),
-        np.full(len(wanted), np.nan),
-    )
+        for name in (names[joint] for joint in _joints_of(model, body)):
+            if name in held:
+                builder.move(joints[name].motion(held[name]))
+            else:
+                builder.add_joint(joints[name], source)
+    found = [joint.name for joint in builder.joints]
+    if joint_names is not None and found != list(joint_names):
+        hint = "; base_link or locked holds those that are not the arm's" if set(joint_names) < set(found) else ""
+        raise BadModel(source, "joint names", f"the joints from the world to {tool[1]!r} are: {', '.join(found)}{hint}")
+    if tool[0] == "site":
+        builder.move(mujoco_pose(model.site_pos[tool_id], model.site_quat[tool_id]))
+    _check_loops(model, found, held, source)
+    unused = [*_unsolid(model), *unused_of_mujoco(model)]
+    speeds = np.full(len(found), np.nan)
+    warnings = (*_ranges_without_force(model, found), *doubtful_limits(builder.joints, speeds))
+    report = ModelReport(source, held, tuple(unused), warnings)
+    return builder.data(speeds, report)
 
 
-def chain_from_urdf(path: str | Path, tcp_frame: str, world_from_base: Pose | None = None) -> ChainData:
+def chain_from_urdf(
+    path: str | Path, tcp_frame: str, request: ChainRequest, world_from_base: Pose | None = None
+) -> ChainData:
     """Read the chain from the root link to a frame of a URDF file, with Pinocchio.
 
     Args:
         path: URDF file.
-        tcp_frame: name of the tool frame.
+        tcp_frame: name of the tool frame: a link, or else a joint.
+        request: joints to hold.
         world_from_base: pose of the root link; default: the identity.
 
     Raises:
-        BadModel: no such file or frame, or a joint that is neither revolute nor prismatic.
+        BadModel: the file cannot be read, no such frame, or a joint of the arm that neither turns nor slides or that
+            follows another one.
     """
-    import pinocchio as pin
-
-    source = Path(path)
-    if not source.is_file():
-        raise BadModel(source, "URDF", "no such file")
-    try:
-        model = pin.buildModelFromUrdf(str(source))
-    except (ValueError, RuntimeError) as error:
-        raise BadModel(source, "URDF", f"cannot be read: {str(error).splitlines()[0]}") from None
-    if not model.existFrame(tcp_frame):
-        frames = ", ".join(frame.name for frame in model.frames[1:])
-        raise BadModel(source, f"frame {tcp_frame!r}", f"not in the model; frames: {frames}")
-    frame = model.frames[model.getFrameId(tcp_frame)]
-    joints = _pinocchio_joints(model, frame)
-    for name, placement in [
-        *((model.names[joint], model.jointPlacements[joint]) for joint in joints),
-        (tcp_frame, frame.placement),
-    ]:
-        _check_placement(source, name, placement.homogeneous)
+    model = read_urdf(path)
+    last, placement = model.frame(tcp_frame)
+    path_joints, joints = model.path(last), model.joints
+    before: list[str] = []
+    if request.base_link is not None:
+        if request.base_link not in model.file.links:
+            raise BadModel(model.source, f"base_link {request.base_link!r}", "is no link of the model")
+        base, _ = model.frame(request.base_link)
+        _check_base(base == 0 or base in path_joints, request, tcp_frame)
+        before = [model.pinocchio.names[joint] for joint in model.path(base)]
+    couplings = model.file.couplings
+    held = held_positions(joints, couplings, request.locked, before, (), str(model.source))
+    names = [model.pinocchio.names[joint] for joint in path_joints]
+    check_independent(names, couplings, held, str(model.source))
     builder = _ChainBuilder()
     builder.move(world_from_base or Pose.identity())
-    for joint in joints:
-        builder.move(Pose.from_matrix(model.jointPlacements[joint].homogeneous))
-        builder.add_joint(*pinocchio_axis(model, joint, source), 0.0)
-    builder.move(Pose.from_matrix(frame.placement.homogeneous))
-    index_q = [model.joints[joint].idx_q for joint in joints]
-    index_v = [model.joints[joint].idx_v for joint in joints]
-    circular = np.array([model.joints[joint].nq == 2 for joint in joints], dtype=bool)
-    return ChainData(
-        tuple(model.names[joint] for joint in joints),
-        builder.chain(),
-        np.where(circular, -np.inf, model.lowerPositionLimit[index_q]),
-        np.where(circular, np.inf, model.upperPositionLimit[index_q]),
-        model.velocityLimit[index_v],
-    )
+    for joint, name in zip(path_joints, names, strict=True):
+        _check_placement(model, name, model.pinocchio.jointPlacements[joint].homogeneous)
+        builder.move(model.placement(joint))
+        if name in held:
+            builder.move(joints[name].motion(held[name]))
+        else:
+            builder.add_joint(joints[name], str(model.source))
+    _check_placement(model, tcp_frame, placement.homogeneous)
+    builder.move(Pose.from_matrix(placement.homogeneous))
+    moving = [joint for joint, name in zip(path_joints, names, strict=True) if name not in held]
+    speeds = model.pinocchio.velocityLimit[[model.pinocchio.joints[joint].idx_v for joint in moving]]
+    unseen = [link.name for link in model.file.links.values() if link.visuals and not link.collisions]
+    unused = [f"links with a <visual> and no <collision>: {listed(unseen)}"] if unseen else []
+    warnings = tuple(doubtful_limits(builder.joints, speeds))
+    return builder.data(speeds, ModelReport(str(model.source), held, (*unused, *model.file.unused), warnings))
 
 
-def _check_placement(source: Path, name: str, matrix: np.ndarray) -> None:
+def _check_base(before_tool: bool, request: ChainRequest, tool: str) -> None:
+    if not before_tool:
+        raise BadModel(request.source, f"base_link {request.base_link!r}", f"is not between the root and {tool!r}")
+
+
+def _check_placement(model: UrdfModel, name: str, matrix: np.ndarray) -> None:
     """Refuse numbers the loader accepts: not finite, farther than 100 m, not a rotation."""
     if not (np.isfinite(matrix).all() and np.abs(matrix[:3, 3]).max() <= FARTHEST):
-        raise BadModel(source, name, f"its origin is not finite or farther than {FARTHEST:g} m")
+        raise BadModel(model.source, name, f"its origin is not finite or farther than {FARTHEST:g} m")
     if np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max() > 1e-6:
-        raise BadModel(source, name, "its orientation is not a rotation")
+        raise BadModel(model.source, name, "its orientation is not a rotation")
 
 
-def mujoco_pose(position: np.ndarray, wxyz: np.ndarray) -> Pose:
-    """Return the pose of a position and a quaternion of a MuJoCo model.
-
-    Args:
-        position: (3,) [m].
-        wxyz: (4,) quaternion, normalized here.
-    """
-    return Pose.from_position_quaternion(position, wxyz / np.linalg.norm(wxyz))
+def _joints_of(model: Any, body: int) -> range:
+    first = int(model.body_jntadr[body])
+    return range(first, first + int(model.body_jntnum[body]))
 
 
-def mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
-    """Return the index of a named element of a compiled model.
-
-    Args:
-        model: `mujoco.MjModel`.
-        kind: "joint", "site" …
-        name: of the element.
-        source: name of the model for messages.
-
-    Raises:
-        BadModel: the model lacks the element.
-    """
-    try:
-        return int(getattr(model, kind)(name).id)
-    except KeyError:
-        raise BadModel(source, f"{kind} {name!r}", "not in the model") from None
+def _check_loops(model: Any, chain: Iterable[str], held: Mapping[str, float], source: str) -> None:
+    """Refuse a constraint that ties two links of the arm together without a joint that gives way."""
+    names, arm = mujoco_joint_names(model), set(chain)
+    for loop in mujoco_loops(model):
+        sides = [{names[j] for b in mujoco_bodies(model, body) for j in _joints_of(model, b)} for body in loop.bodies]
+        between = sides[0] ^ sides[1]
+        if not loop.mocap and between & arm and not between - arm - held.keys():
+            raise BadModel(
+                source, loop.name, f"makes joints of the arm follow each other: {listed(sorted(between & arm), SHOWN)}"
+            )
 
 
-def mujoco_bodies(model: Any, body: int) -> list[int]:
-    """Return the bodies from the world (excluded) to a body (included).
-
-    Args:
-        model: `mujoco.MjModel`.
-        body: index of the last body.
-    """
-    path = []
-    while body != 0:
-        path.append(body)
-        body = int(model.body_parentid[body])
-    return path[::-1]
+def _ranges_without_force(model: Any, chain: Iterable[str]) -> list[str]:
+    """Return a line on joints of the arm whose range is given and not in force."""
+    every = enumerate(mujoco_joint_names(model))
+    joints = [name for k, name in every if name in set(chain) and not model.jnt_limited[k] and model.jnt_range[k].any()]
+    return [f"ranges that limited=false puts out of force: {listed(joints, SHOWN)}"] if joints else []
 
 
-def _pinocchio_joints(model: Any, frame: Any) -> list[int]:
-    # `parent` was renamed in Pinocchio 3
-    joint = int(frame.parentJoint if hasattr(frame, "parentJoint") else frame.parent)
-    path = []
-    while joint != 0:
-        path.append(joint)
-        joint = int(model.parents[joint])
-    return path[::-1]
-
-
-def pinocchio_axis(model: Any, joint: int, source: Path) -> tuple[np.ndarray, np.ndarray, float]:
-    """Read a joint's axis from its own column of the Jacobian in its own frame.
-
-    Args:
-        model: `pinocchio.Model`.
-        joint: index of the joint.
-        source: the file, for messages.
-
-    Returns:
-        Axis (3,), position (3,) [m] and kind (REVOLUTE or PRISMATIC).
-
-    Raises:
-        BadModel: the joint is neither revolute nor prismatic.
-    """
-    import pinocchio as pin
-
-    if model.joints[joint].nv != 1:
-        raise BadModel(source, f"joint {model.names[joint]!r}", "neither turns nor slides")
-    jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-    # for a model of one joint Pinocchio returns a vector
-    column = jacobian.reshape(6, -1)[:, model.joints[joint].idx_v]
-    if not abs(np.linalg.norm(column) - 1.0) < 1e-6:
-        raise BadModel(source, f"joint {model.names[joint]!r}", "its axis is not a direction")
-    if np.linalg.norm(column[3:]) > 0.5:
-        return column[3:], np.zeros(3), REVOLUTE
-    return column[:3], np.zeros(3), PRISMATIC
+def _unsolid(model: Any) -> list[str]:
+    """Return a line on the bodies of which no geom collides, though they have some."""
+    bodies = [k for k in range(1, model.nbody) if len(geoms_of(model, k)) and not solid_geoms(model, k)]
+    return [f"bodies whose geoms do not collide: {listed(model.body(k).name for k in bodies)}"] if bodies else []
