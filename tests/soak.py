@@ -17,7 +17,7 @@ import platform
 import sys
 import tempfile
 import time
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -31,11 +31,12 @@ from onedemo.planner.collision.capsule_placement import place_capsules
 from onedemo.planner.collision.clearance import find_near, slack_at
 from onedemo.planner.collision.robot_arrays import ROW, SETTING
 from onedemo.planner.escape.tangent_plane import random_number
+from onedemo.planner.fitting.body_readers import body_from_urdf
 from onedemo.planner.geometry.pose import Pose
-from onedemo.planner.geometry.shapes import Box, Obstacle
+from onedemo.planner.geometry.shapes import Box, Mesh, Obstacle
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import BODY, Body
-from onedemo.planner.robot.body_readers import body_from_urdf, resting_pairs
+from onedemo.planner.robot.resting_pairs import resting_pairs
 from onedemo.planner.safety import safety_layer as safety
 from onedemo.planner.safety.barrier import allowed_speeds, constrain, scale_to_speeds
 from onedemo.planner.safety.safety_layer import HELD, SafetyLayer, SafetySettings, safe_velocity
@@ -286,27 +287,43 @@ def frames_of(arm: Arm, q: np.ndarray) -> list[np.ndarray]:
 
 
 def fcl_rooms(scene: Scene, log: np.ndarray, substeps: int) -> float:
-    """Smallest room [m] in the logged steps as python-fcl sees it, with kinematics of its own."""
+    """Smallest room [m] in the logged steps as python-fcl sees it, with kinematics of its own.
+
+    Where a capsule is too close, its hull is asked: what the capsule covers lies in both.
+    """
     things, least, n = [fcl_obstacle(obstacle) for obstacle in scene.obstacles], np.inf, scene.layer.joints
     for row in log:
         for s in range(substeps + 1):
             q = row[:n] + s * scene.dt * row[n:] / substeps
-            parts, bases, first = [], [], 0
+            parts, bodies, bases, first = [], [], [], 0
             for arm, body in zip(scene.robot.arms, scene.robot.bodies, strict=True):
                 frames = frames_of(arm, q[first : first + arm.dof])
                 first += arm.dof
-                for capsule in body.rows:
+                for capsule, hull in zip(body.rows, body.hulls or [None] * len(body), strict=True):
                     frame = frames[int(capsule[0]) + 1]
                     a, b = (frame[:3, :3] @ capsule[k : k + 3] + frame[:3, 3] for k in (1, 4))
                     parts.append(fcl_capsule(a, b, capsule[7]))
+                    bodies.append((hull, frame))
                     bases.append(capsule[0] < 0)
-            moving = [part for part, fixed in zip(parts, bases, strict=True) if not fixed]
-            for part in moving:
+            settings, solid = scene.layer.settings, [partial(hull_solid, *place) for place in bodies]
+            for c in np.flatnonzero(~np.array(bases)):
                 for thing in things:
-                    least = min(least, fcl_distance(part, thing) - scene.layer.settings.distance)
+                    room = fcl_distance(parts[c], thing) - settings.distance
+                    if room < 0.0 and bodies[c][0] is not None:
+                        room = max(room, fcl_distance(solid[c](), thing) - bodies[c][0].rounding - settings.distance)
+                    least = min(least, room)
             for i, j in scene.robot.pairs:
-                least = min(least, fcl_distance(parts[i], parts[j]) - scene.layer.settings.self_distance)
+                room = fcl_distance(parts[i], parts[j]) - settings.self_distance
+                if room < 0.0 and bodies[i][0] is not None and bodies[j][0] is not None:
+                    rounding = bodies[i][0].rounding + bodies[j][0].rounding
+                    room = max(room, fcl_distance(solid[i](), solid[j]()) - rounding - settings.self_distance)
+                least = min(least, room)
     return float(least)
+
+
+def hull_solid(hull, frame: np.ndarray):
+    """A hull in fcl, without its rounding, where a frame (4, 4) puts it."""
+    return fcl_obstacle(Obstacle(Mesh(hull.corners @ frame[:3, :3].T + frame[:3, 3])))
 
 
 # ------------------------------------------------------------------ the long run

@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...planner import Body, body_from_mujoco
 from ...planner.errors import UnknownName
-from ...planner.robot.body import BODY
+from ...planner.robot.body import BODY, Hull
 from .robots import ROBOTS, Robot
 from .scene import compiled_scene
 
 TABLE = Path(__file__).parents[1] / "assets" / "bodies.json"
 DIGITS = 5
 """Number of decimals of the shipped lengths [m]; radii are rounded up."""
+WITH_HULLS = ("UR5e",)
+"""Robots whose capsules alone would refuse postures that they work in: their bodies have hulls."""
 
 
 def fitted_bodies(robot: Robot) -> tuple[Body, ...]:
@@ -26,8 +29,9 @@ def fitted_bodies(robot: Robot) -> tuple[Body, ...]:
     """
     sides = tuple(robot.ready)
     scene = compiled_scene(robot, arms=sides)
-    bodies = [body_from_mujoco(scene.model, index.arm, index.arm.joint_names) for index in scene.arms]
-    return tuple(_rounded(body if len(sides) == 1 else _moving(body)) for body in bodies)
+    exact = robot.name in WITH_HULLS
+    bodies = [body_from_mujoco(scene.model, index.arm, index.arm.joint_names, exact=exact) for index in scene.arms]
+    return tuple(_rounded(body if len(sides) == 1 else body.moving()) for body in bodies)
 
 
 @cache
@@ -45,26 +49,43 @@ def robot_body(robot: Robot, index: int = 0) -> Body:
     if robot.name not in table:
         raise UnknownName("robot with a body", robot.name, table)
     entry = table[robot.name][index]
-    return Body(np.array(entry["rows"]), tuple(entry["names"]))
+    hulls = [Hull(np.array(hull["corners"]), hull["rounding"]) for hull in entry.get("hulls", ())]
+    pairs = entry.get("pairs")
+    return Body(
+        np.array(entry["rows"]),
+        tuple(entry["names"]),
+        hulls=tuple(None if k < 0 else hulls[k] for k in entry.get("hull_of", ())),
+        pairs=None if pairs is None else tuple((i, j) for i, j in pairs),
+    )
 
 
 def table_text(robots: tuple[str, ...]) -> str:
     """Fit all bodies anew; return the text of the shipped table, written by `make bodies`."""
-    table = {
-        robot: [{"names": list(body.names), "rows": body.rows.tolist()} for body in fitted_bodies(ROBOTS[robot])]
-        for robot in robots
-    }
+    table = {robot: [_entry(body) for body in fitted_bodies(ROBOTS[robot])] for robot in robots}
     return json.dumps(table, indent=1) + "\n"
 
 
-def _moving(body: Body) -> Body:
-    """Return a body without its fixed capsules."""
-    keep = np.flatnonzero(body.rows[:, BODY.frame] >= 0)
-    return Body(body.rows[keep], tuple(body.names[k] for k in keep))
+def _entry(body: Body) -> dict[str, Any]:
+    entry: dict[str, Any] = {"names": list(body.names), "rows": body.rows.tolist()}
+    if body.hulls:
+        kept = list({id(hull): hull for hull in body.hulls if hull is not None}.values())
+        place = {id(hull): k for k, hull in enumerate(kept)}
+        entry["hulls"] = [{"corners": hull.corners.tolist(), "rounding": hull.rounding} for hull in kept]
+        entry["hull_of"] = [-1 if hull is None else place[id(hull)] for hull in body.hulls]
+    if body.pairs is not None:
+        entry["pairs"] = [list(pair) for pair in body.pairs]
+    return entry
 
 
 def _rounded(body: Body) -> Body:
     rows = np.round(body.rows, DIGITS)
     # rounding may move the ends by half a unit per axis, so the radius grows by two
     rows[:, BODY.radius] = np.ceil(body.rows[:, BODY.radius] * 10**DIGITS + 2.0) / 10**DIGITS
-    return Body(rows, body.names)
+    # corners move like the ends, so their rounding grows by as much
+    rounded = {id(hull): _rounded_hull(hull) for hull in body.hulls if hull is not None}
+    hulls = tuple(None if hull is None else rounded[id(hull)] for hull in body.hulls)
+    return Body(rows, body.names, hulls=hulls, pairs=body.pairs)
+
+
+def _rounded_hull(hull: Hull) -> Hull:
+    return Hull(np.round(hull.corners, DIGITS), float(np.ceil(hull.rounding * 10**DIGITS + 1.0) / 10**DIGITS))

@@ -8,7 +8,7 @@ from ..geometry.screw import rotate
 from ..geometry.shapes import OBSTACLE
 from ..jit import inlined, inner, kernel
 from ..robot.kinematics import FRAME, forward
-from .robot_arrays import ARM_ENTRY, CAPSULE, HEADER, PLACED, ROW
+from .robot_arrays import ARM_ENTRY, CAPSULE, HEADER, MASK_BITS, PLACED, ROW
 
 
 @kernel
@@ -58,6 +58,8 @@ def place_frames(g, world):
     count = int(g[ROW.header, HEADER.capsules])
     for c in range(count):
         frame, body, row = int(g[ROW.body + c, CAPSULE.frame]), ROW.body + c, world + c
+        if g[body, CAPSULE.corners] > 0.0:
+            _place_hull(g, frame, row)
         if frame < 0:
             for i in range(3):
                 g[row, PLACED.a + i] = g[body, CAPSULE.a + i]
@@ -72,6 +74,16 @@ def place_frames(g, world):
             g[row, PLACED.b + i] = b[i] + g[f, o + i]
             g[row, PLACED.center + i] = 0.5 * (g[row, PLACED.a + i] + g[row, PLACED.b + i])
     _hold_all(g, world, count)
+
+
+@inner
+def _place_hull(g, frame, row):
+    """Store the pose of a frame with a placed capsule: its hull is placed only where it is needed."""
+    for i in range(3):
+        g[row, PLACED.origin + i] = g[ROW.frames + frame, FRAME.origin + i] if frame >= 0 else 0.0
+    for i in range(4):
+        rest = 1.0 if i == 0 else 0.0
+        g[row, PLACED.rotation + i] = g[ROW.frames + frame, FRAME.rotation + i] if frame >= 0 else rest
 
 
 @inner
@@ -124,4 +136,4 @@ def may_touch(g, obstacle, capsule):
         obstacle: number of the obstacle.
         capsule: number of the capsule.
     """
-    return (int(g[ROW.obstacles + obstacle, OBSTACLE.mask]) >> capsule) & 1 == 1
+    return (int(g[ROW.obstacles + obstacle, OBSTACLE.mask + capsule // MASK_BITS]) >> (capsule % MASK_BITS)) & 1 == 1

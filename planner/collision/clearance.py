@@ -9,6 +9,7 @@ from __future__ import annotations
 from ..geometry.shapes import OBSTACLE
 from ..jit import inlined, inner, kernel
 from .capsule_placement import end_a, end_b, may_touch, place_capsules
+from .hull_distance import asks_hull, asks_hulls, obstacle_hull_distance, pair_hull_distance
 from .proximity import FAR, between_segments, closest, distance, is_beyond
 from .robot_arrays import ARM_ENTRY, CAPSULE, HEADER, NEAR_PAIR, PAIR, PLACED, ROW, SETTING
 
@@ -62,6 +63,21 @@ def obstacle_distance(g, world, c, k, seconds, cutoff):
     return distance(g, ROW.obstacles + k, g, a, b) - g[ROW.body + c, CAPSULE.radius]
 
 
+@inner
+def hull_distance(g, world, c, k, seconds, cutoff):
+    """Return the distance [m] of a capsule's hull from an obstacle; beyond the cutoff a lower bound.
+
+    Args:
+        g: array of the robot, see `robot_arrays`.
+        world: first row of the placed capsules.
+        c: number of the capsule; it has a hull.
+        k: number of the obstacle.
+        seconds: time from now [s].
+        cutoff: distance [m].
+    """
+    return obstacle_hull_distance(g, world, c, k, shifted(g, k, (0.0, 0.0, 0.0), seconds), cutoff)[0]
+
+
 @inlined
 def all_beyond(g, world, k, seconds, cutoff):
     """Return True if all capsules that move surely are farther from an obstacle than the cutoff.
@@ -109,10 +125,17 @@ def min_slack(g, world, seconds, cutoff):
             continue
         for c in range(int(g[ROW.header, HEADER.capsules])):
             if g[ROW.body + c, CAPSULE.frame] >= 0.0 and not may_touch(g, k, c):
-                least = min(least, obstacle_distance(g, world, c, k, seconds, least + margin) - margin)
+                slack = obstacle_distance(g, world, c, k, seconds, least + margin) - margin
+                if slack < least and asks_hull(g, c, slack):
+                    slack = max(slack, hull_distance(g, world, c, k, seconds, least + margin) - margin)
+                least = min(least, slack)
     first, margin = int(g[ROW.header, HEADER.first_pair]), g[ROW.settings, SETTING.self_margin]
     for p in range(first, first + int(g[ROW.header, HEADER.pairs])):
-        least = min(least, capsule_distance(g, world, int(g[p, PAIR.first]), int(g[p, PAIR.second])) - margin)
+        i, j = int(g[p, PAIR.first]), int(g[p, PAIR.second])
+        slack = capsule_distance(g, world, i, j) - margin
+        if slack < least and asks_hulls(g, i, j, slack):
+            slack = max(slack, pair_hull_distance(g, world, i, j, least + margin)[0] - margin)
+        least = min(least, slack)
     return least
 
 
@@ -136,7 +159,16 @@ def _note(g, row, self_pair, i, j, distance, margin, normal, t, s):
     g[row, NEAR_PAIR.distance], g[row, NEAR_PAIR.margin] = distance, margin
     for k in range(3):
         g[row, NEAR_PAIR.normal + k] = normal[k]
-    g[row, NEAR_PAIR.t], g[row, NEAR_PAIR.s] = t, s
+    g[row, NEAR_PAIR.t], g[row, NEAR_PAIR.s], g[row, NEAR_PAIR.exact] = t, s, 0.0
+
+
+@inner
+def _note_hulls(g, row, distance, normal, p, q):
+    """Put the closest points of the hulls in place of those of the capsules."""
+    g[row, NEAR_PAIR.distance], g[row, NEAR_PAIR.exact] = distance, 1.0
+    for k in range(3):
+        g[row, NEAR_PAIR.normal + k] = normal[k]
+        g[row, NEAR_PAIR.point + k], g[row, NEAR_PAIR.other_point + k] = p[k], q[k]
 
 
 @kernel
@@ -164,6 +196,13 @@ def find_near(g, shell):
             if distance > shell:
                 continue
             _note(g, row, 0.0, c, k, distance, margin, normal, t, 0.0)
+            if asks_hull(g, c, distance - margin):
+                further, normal, p = obstacle_hull_distance(g, ROW.placed, c, k, (0.0, 0.0, 0.0), shell)
+                if further > shell:
+                    continue
+                if further > distance:
+                    distance = further
+                    _note_hulls(g, row, distance, normal, p, p)
             least, row = min(least, distance - margin), row + 1
     pair, margin = int(g[ROW.header, HEADER.first_pair]), g[ROW.settings, SETTING.self_margin]
     for p in range(pair, pair + int(g[ROW.header, HEADER.pairs])):
@@ -171,9 +210,17 @@ def find_near(g, shell):
         one, other = ROW.placed + i, ROW.placed + j
         distance, t, s, normal = between_segments(end_a(g, one), end_b(g, one), end_a(g, other), end_b(g, other))
         distance -= g[ROW.body + i, CAPSULE.radius] + g[ROW.body + j, CAPSULE.radius]
-        if distance <= shell:
-            _note(g, row, 1.0, i, j, distance, margin, normal, t, s)
-            least, row = min(least, distance - margin), row + 1
+        if distance > shell:
+            continue
+        _note(g, row, 1.0, i, j, distance, margin, normal, t, s)
+        if asks_hulls(g, i, j, distance - margin):
+            further, normal, p, q = pair_hull_distance(g, ROW.placed, i, j, shell)
+            if further > shell:
+                continue
+            if further > distance:
+                distance = further
+                _note_hulls(g, row, distance, normal, p, q)
+        least, row = min(least, distance - margin), row + 1
     g[ROW.header, HEADER.near] = row - first
     return least
 

@@ -17,29 +17,51 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import check_capacity
 from ..geometry import screw
 from ..geometry.shapes import OBSTACLE, Packed, pack
 from ..jit import inlined, inner, kernel
+from ..robot.body import MAX_CAPSULES, Hull
 from ..robot.kinematics import FRAME
 from .capsule_placement import end_a, end_b, may_touch, place_frames
-from .clearance import all_beyond, find_near, min_slack, obstacle_distance
+from .clearance import all_beyond, find_near, hull_distance, min_slack, obstacle_distance
+from .hull_distance import asks_hull, obstacle_hull_distance
 from .proximity import closest
-from .robot_arrays import CAPSULE, HEADER, NEAR_PAIR, PLACED, ROW, lay_capsules, robot_arrays, with_obstacles
+from .robot_arrays import (
+    CAPSULE,
+    HEADER,
+    NEAR_PAIR,
+    PLACED,
+    ROW,
+    lay_capsules,
+    robot_arrays,
+    with_hulls,
+    with_obstacles,
+)
 
 SMALLEST = 1e-4
 """Length [m] below which a stretch that cannot be proven counts as blocked."""
 
 
-def tool_arrays(capsules: np.ndarray, packed: Packed, *, masks: Sequence[int] = (), margin: float = 0.0) -> np.ndarray:
+def tool_arrays(
+    capsules: np.ndarray,
+    packed: Packed,
+    *,
+    hulls: Sequence[Hull | None] = (),
+    masks: Sequence[int] = (),
+    margin: float = 0.0,
+) -> np.ndarray:
     """Return the packed array of a tool among obstacles.
 
     Args:
         capsules: (m, 7), see `Body.tool`.
         packed: the obstacles.
+        hulls: (m,) of the capsules, see `Body.tool_hulls`; (): none.
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
         margin: distance [m] to keep from obstacles without a margin of their own.
     """
-    work = robot_arrays((), (), pack(()))
+    check_capacity("capsules", len(capsules), MAX_CAPSULES)
+    work = with_hulls(robot_arrays((), (), pack(())), hulls)
     work[ROW.header, HEADER.capsules] = len(capsules)
     lay_capsules(work[ROW.body : ROW.body + len(capsules)], capsules)
     return with_obstacles(work, packed, masks, margin)
@@ -88,18 +110,28 @@ def tool_slack(g, x, cutoff):
 
 
 @inlined
-def _moved(p, delta, s):
-    return (p[0] + s * delta[0], p[1] + s * delta[1], p[2] + s * delta[2])
+def _moved(p, shift):
+    return (p[0] + shift[0], p[1] + shift[1], p[2] + shift[2])
 
 
 @inner
-def _pair_slides_clear(g, c, k, delta, margin, s):
-    """True if capsule c, placed at ROW.placed, keeps its margin from obstacle k on a slide from fraction s on."""
-    a, b, radius = end_a(g, ROW.placed + c), end_b(g, ROW.placed + c), g[ROW.body + c, CAPSULE.radius]
+def _sliding_distance(g, c, k, shift, hull):
+    """Distance [m] of capsule c, or of its hull, from obstacle k after a shift, and the normal there."""
+    if hull:
+        distance, n, _ = obstacle_hull_distance(g, ROW.placed, c, k, shift, math.inf)
+        return distance, n
+    a, b = end_a(g, ROW.placed + c), end_b(g, ROW.placed + c)
+    distance, _, n = closest(g, ROW.obstacles + k, g, _moved(a, shift), _moved(b, shift))
+    return distance - g[ROW.body + c, CAPSULE.radius], n
+
+
+@inner
+def _pair_slides_clear(g, c, k, delta, margin, s, hull):
+    """True if capsule c, or its hull, keeps its margin from obstacle k on a slide from fraction s on."""
     length = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2])
     for _ in range(64):
-        distance, _, n = closest(g, ROW.obstacles + k, g, _moved(a, delta, s), _moved(b, delta, s))
-        slack = distance - radius - margin
+        distance, n = _sliding_distance(g, c, k, (s * delta[0], s * delta[1], s * delta[2]), hull)
+        slack = distance - margin
         if slack < 0.0:
             return False
         slope = n[0] * delta[0] + n[1] * delta[1] + n[2] * delta[2]
@@ -129,14 +161,20 @@ def slide_is_clear(g, delta):
         if slope >= 0.0 or slack + slope >= 0.0:
             continue
         c, obstacle = int(g[row, NEAR_PAIR.capsule]), int(g[row, NEAR_PAIR.other])
-        if not _pair_slides_clear(g, c, obstacle, delta, margin, -slack / slope):
+        s = -slack / slope
+        if _pair_slides_clear(g, c, obstacle, delta, margin, s, False):
+            continue
+        hull = g[ROW.body + c, CAPSULE.corners] > 0.0
+        if not (hull and _pair_slides_clear(g, c, obstacle, delta, margin, s, True)):
             return False
     return True
 
 
 @kernel
 def point_speeds(g, twist):
-    """Compute the largest speed of a point of each capsule along a screw, into the column PLACED.reach.
+    """Compute the largest speed of a point of each capsule's core along a screw, into the column PLACED.reach.
+
+    Points of a hull may be faster by PLACED.swing.
 
     Args:
         g: array of the tool, see `tool_arrays`.
@@ -154,6 +192,11 @@ def point_speeds(g, twist):
             x, y, z = v[0] + u[0], v[1] + u[1], v[2] + u[2]
             speed = max(speed, math.sqrt(x * x + y * y + z * z))
         g[ROW.placed + c, PLACED.reach] = speed
+        if g[row, CAPSULE.corners] > 0.0:
+            # no point of what the capsule covers is farther from the core than the radius
+            swing = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) * g[row, CAPSULE.radius]
+            g[ROW.placed + c, PLACED.swing] = swing
+            speed += swing
         fastest = max(fastest, speed)
     return fastest
 
@@ -182,10 +225,16 @@ def _stretch(g, left, fastest):
             speed = g[ROW.placed + c, PLACED.reach]
             if not may_touch(g, k, c):
                 slack = obstacle_distance(g, ROW.placed_next, c, k, 0.0, margin + stretch * speed) - margin
-                if slack < 0.0:
+                if slack >= stretch * speed:
+                    continue
+                part = slack / speed if speed > 0.0 else -1.0
+                if asks_hull(g, c, slack):
+                    speed += g[ROW.placed + c, PLACED.swing]
+                    slack = hull_distance(g, ROW.placed_next, c, k, 0.0, margin + stretch * speed) - margin
+                    part = max(part, slack / speed if speed > 0.0 else slack)
+                if part < 0.0:
                     return -1.0
-                if slack < stretch * speed:
-                    stretch = slack / speed
+                stretch = min(stretch, part)
     return stretch
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
+from ..geometry.gjk import segment_polytope
 from ..geometry.shapes import OBSTACLE, SHAPE_KIND
 from ..jit import inlined, inner, kernel
-from .gjk import segment_polytope
 
 FAR = 1e30
 """Distance returned for a pair beyond the cutoff."""

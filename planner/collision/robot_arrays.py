@@ -12,14 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import BadOption
+from ..errors import BadModel, BadOption
+from ..geometry.convex_distance import PER_ROW
 from ..geometry.shapes import OBSTACLE, Packed
 from ..robot.arm import Arm
-from ..robot.body import BODY, TOOL_CAPSULE, Body
+from ..robot.body import BODY, MAX_CAPSULES, TOOL_CAPSULE, Body, Hull
 from ..robot.kinematics import CHAIN, PRISMATIC
 
 WIDTH = 40
-MAX_ARMS, MAX_JOINTS, MAX_CAPSULES = 2, 16, 52
+MAX_ARMS, MAX_JOINTS = 2, 16
+MASK_BITS = 32
+"""Capsules in one column of an obstacle's mask."""
 
 
 class Rows(NamedTuple):
@@ -48,10 +51,10 @@ class Rows(NamedTuple):
     posed: int = 63  # joints that the frames belong to
     frames: int = 64  # one row per joint, see `kinematics.FRAME`
     body: int = 84  # one row per capsule, see CAPSULE
-    placed: int = 136  # one row per capsule, where it is now, see PLACED
-    placed_next: int = 188  # one row per capsule, where it is after a step, see PLACED
-    factor: int = 240  # scratch: Cholesky factor of the quadratic program
-    obstacles: int = 272  # one row per obstacle, see `shapes.OBSTACLE`; what follows starts at rows of the header
+    placed: int = 148  # one row per capsule, where it is now, see PLACED
+    placed_next: int = 212  # one row per capsule, where it is after a step, see PLACED
+    factor: int = 276  # scratch: Cholesky factor of the quadratic program
+    obstacles: int = 308  # one row per obstacle, see `shapes.OBSTACLE`; what follows starts at rows of the header
 
 
 class HeaderColumns(NamedTuple):
@@ -67,6 +70,8 @@ class HeaderColumns(NamedTuple):
     first_near: int = 7  # see NEAR_PAIR
     first_bound: int = 8  # rows of the quadratic program, see `qp.QP`
     first_vertex: int = 9  # vertices (3) of the meshes [m]
+    first_corner: int = 10  # corners (3) of the capsules' hulls [m], `convex_distance.PER_ROW` in a row
+    corner_rows: int = 11
 
 
 class SettingColumns(NamedTuple):
@@ -111,6 +116,9 @@ class CapsuleColumns(NamedTuple):
     b: int = 5  # the other end (3) [m]
     radius: int = 8  # [m]
     ball: int = 9  # radius [m] of the ball about the middle of the core that contains the capsule
+    first_corner: int = 10  # of the hull that bounds the capsule's content too, counted from HEADER.first_corner on
+    corners: int = 11  # number of corners of that hull; 0: there is none
+    rounding: int = 12  # rounding radius of that hull [m]
 
 
 class PlacedColumns(NamedTuple):
@@ -122,6 +130,9 @@ class PlacedColumns(NamedTuple):
     reach: int = 9  # longest displacement [m] of any point of the capsule during a step
     all_center: int = 10  # center (3) [m] of a ball that contains all capsules that move
     all_radius: int = 13  # its radius [m]
+    origin: int = 14  # origin (3) [m] of the frame, of a capsule with a hull
+    rotation: int = 17  # quaternion (4) wxyz of the frame, of a capsule with a hull
+    swing: int = 21  # displacement [m] of a point of the hull beyond `reach`
 
 
 class PairColumns(NamedTuple):
@@ -142,6 +153,9 @@ class NearPairColumns(NamedTuple):
     normal: int = 5  # unit normal (3) from the other to the capsule
     t: int = 8  # parameter in [0, 1] of the closest point on the capsule's core
     s: int = 9  # the same on the core of the other capsule
+    exact: int = 10  # 1 if distance and normal are those of the hulls; then the points are
+    point: int = 11  # closest point (3) of the capsule's hull [m]
+    other_point: int = 14  # closest point (3) of the other capsule's hull or core [m]
 
 
 ROW, HEADER, SETTING, ARM_ENTRY, LAST_LOOK = Rows(), HeaderColumns(), SettingColumns(), ArmEntry(), LastLookColumns()
@@ -171,6 +185,7 @@ def robot_arrays(
 
     Raises:
         BadOption: too many arms, joints or capsules.
+        BadModel: a body of another arm.
     """
     count, joints = sum(len(body) for body in bodies), sum(arm.dof for arm in arms)
     if len(arms) > MAX_ARMS or count > MAX_CAPSULES or joints > MAX_JOINTS:
@@ -179,6 +194,10 @@ def robot_arrays(
             f"allowed are {MAX_ARMS}, {MAX_CAPSULES} and {MAX_JOINTS}"
         )
         raise BadOption("robot", reason)
+    for arm, body in zip(arms, bodies, strict=True):
+        if len(body) and body.rows[:, BODY.frame].max() >= arm.dof:
+            reason = f"a capsule moves with joint {body.rows[:, BODY.frame].max():g}; {arm.name!r} has {arm.dof}"
+            raise BadModel("body", "rows", reason)
     work = np.zeros((ROW.obstacles + len(pairs), WIDTH))
     header = work[ROW.header]
     header[HEADER.arms], header[HEADER.joints], header[HEADER.capsules] = len(arms), joints, count
@@ -188,7 +207,30 @@ def robot_arrays(
     if len(pairs):
         work[ROW.obstacles :, PAIR.first : PAIR.second + 1] = pairs
     _lay_arms(work, arms, bodies)
-    return with_obstacles(work, packed, masks, margin)
+    hulls = [hull for body in bodies for hull in body.hulls or [None] * len(body)]
+    return with_obstacles(with_hulls(work, hulls), packed, masks, margin)
+
+
+def with_hulls(robot: np.ndarray, hulls: Sequence[Hull | None]) -> np.ndarray:
+    """Return the array of a robot, without obstacles and hulls so far, with the hulls of its capsules.
+
+    Args:
+        robot: array of the robot.
+        hulls: per capsule; shared ones are stored once.
+    """
+    rows, known, end = [], {}, len(robot)
+    for capsule, hull in zip(robot[ROW.body :], hulls, strict=False):
+        if hull is None:
+            continue
+        if id(hull) not in known:
+            known[id(hull)] = len(rows)
+            for first in range(0, len(hull.corners), PER_ROW):
+                numbers = np.asarray(hull.corners)[first : first + PER_ROW].ravel()
+                rows.append(np.pad(numbers, (0, WIDTH - len(numbers))))
+        capsule[CAPSULE.first_corner], capsule[CAPSULE.corners] = known[id(hull)], len(hull.corners)
+        capsule[CAPSULE.rounding] = hull.rounding
+    robot[ROW.header, HEADER.first_corner], robot[ROW.header, HEADER.corner_rows] = end, len(rows)
+    return np.vstack([robot, *rows]) if rows else robot
 
 
 def with_obstacles(robot: np.ndarray, packed: Packed, masks: Sequence[int], margin: float) -> np.ndarray:
@@ -202,9 +244,11 @@ def with_obstacles(robot: np.ndarray, packed: Packed, masks: Sequence[int], marg
     """
     joints, capsules, pairs = (int(robot[ROW.header, k]) for k in (HEADER.joints, HEADER.capsules, HEADER.pairs))
     k, old = len(packed.rows), int(robot[ROW.header, HEADER.first_pair])
+    corner_rows = int(robot[ROW.header, HEADER.corner_rows])
     near = capsules * k + pairs
     first_pair = ROW.obstacles + k
-    first_near = first_pair + pairs
+    first_corner = first_pair + pairs
+    first_near = first_corner + corner_rows
     first_bound = first_near + near
     first_vertex = first_bound + near + 2 * joints
     work = np.zeros((first_vertex + len(packed.vertices), WIDTH))
@@ -213,14 +257,17 @@ def with_obstacles(robot: np.ndarray, packed: Packed, masks: Sequence[int], marg
     header[HEADER.obstacles], header[HEADER.pairs], header[HEADER.near] = k, pairs, 0
     header[HEADER.first_pair], header[HEADER.first_near] = first_pair, first_near
     header[HEADER.first_bound], header[HEADER.first_vertex] = first_bound, first_vertex
+    header[HEADER.first_corner] = first_corner
     velocities, own_margins = packed.rows[:, OBSTACLE.velocity : OBSTACLE.ball], packed.rows[:, OBSTACLE.own_margin]
     look[LAST_LOOK.valid], look[LAST_LOOK.moving] = 0.0, float(velocities.any())
     rows[:, : OBSTACLE.packed] = packed.rows
     # vertices lie in the same array: meshes know their rows in it
     rows[:, OBSTACLE.first_vertex] += first_vertex
-    rows[:, OBSTACLE.mask] = masks if len(masks) else 0
+    for column in (0, 1):
+        bits = [mask >> MASK_BITS * column & (1 << MASK_BITS) - 1 for mask in masks]
+        rows[:, OBSTACLE.mask + column] = bits if bits else 0
     rows[:, OBSTACLE.margin] = np.where(own_margins < 0, margin, own_margins)
-    work[first_pair:first_near] = robot[old : old + pairs]
+    work[first_pair:first_near] = robot[old : old + pairs + corner_rows]
     work[first_vertex:, :3] = packed.vertices
     return work
 
@@ -244,6 +291,8 @@ def _lay_arms(work: np.ndarray, arms: Sequence[Arm], bodies: Sequence[Body]) -> 
         offsets[:-1] += np.where(slides, np.maximum(abs(arm.lower), abs(arm.upper)), 0.0)
         ends = body.rows[:, BODY.a : BODY.radius].reshape(-1, 2, 3)
         extents = np.linalg.norm(ends, axis=2).max(axis=1) if len(body) else np.zeros(1)
+        if body.hulls:  # a core lies within its capsule, the hull's points reach its surface
+            extents = extents + np.where([hull is not None for hull in body.hulls], body.rows[:, BODY.radius], 0.0)
         beyond = np.append(np.cumsum(offsets[:0:-1])[::-1], 0.0)[: arm.dof]
         levers = np.where(np.isfinite(beyond), beyond, 1e6) + extents.max()
         work[ROW.levers, columns] = np.where(slides, 1.0, levers)

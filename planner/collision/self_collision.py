@@ -11,7 +11,7 @@ from ..geometry.shapes import pack
 from ..jit import kernel
 from ..robot.arm import Arm
 from ..robot.body import BODY, Body
-from ..robot.body_readers import resting_pairs
+from ..robot.resting_pairs import resting_pairs
 from .capsule_placement import place_capsules
 from .clearance import capsule_distance
 from .robot_arrays import ROW, robot_arrays
@@ -31,14 +31,17 @@ def _gaps(g, q, out):
 def body_pairs(arm: Arm, body: Body, margin: float) -> list[tuple[int, int]]:
     """Return the pairs (i, j), i < j, of an arm's own capsules that may hit each other.
 
-    Excluded are pairs in the same or in neighboring frames, which always touch, and pairs closer than the margin with
-    every joint in the middle of its range (at zero if it has none): there the capsules are close, not the real links.
+    Those of the body, if they are known. Else excluded are pairs in the same or in neighboring frames, which always
+    touch, and pairs closer than the margin with every joint in the middle of its range (at zero if it has none): there
+    the capsules are close, not the real links.
 
     Args:
         arm: the arm.
         body: its capsules.
         margin: distance [m].
     """
+    if body.pairs is not None:
+        return list(body.pairs)
     limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
     middle = np.where(limited, 0.5 * (np.where(limited, arm.lower, 0.0) + np.where(limited, arm.upper, 0.0)), 0.0)
     gaps, frames = np.zeros((len(body), len(body))), body.rows[:, BODY.frame]
@@ -60,8 +63,9 @@ def pairs_of(arms: Sequence, bodies: Sequence[Body], *, apart: int = 2) -> list[
     pairs, first = [], 0
     starts = np.concatenate([[0], np.cumsum([len(body) for body in bodies])])
     for arm, body in zip(arms, bodies, strict=True):
-        resting = {tuple(sorted(pair)) for pair in resting_pairs(arm, body)}
-        frames, all_pairs = body.rows[:, BODY.frame], combinations(range(len(body)), 2)
+        resting = {tuple(sorted(pair)) for pair in resting_pairs(arm, body)} if body.pairs is None else set()
+        frames = body.rows[:, BODY.frame]
+        all_pairs = combinations(range(len(body)), 2) if body.pairs is None else body.pairs
         own = [(i, j) for i, j in all_pairs if abs(frames[i] - frames[j]) >= apart and (i, j) not in resting]
         pairs += [(first + i, first + j) for i, j in own]
         first += len(body)

@@ -13,6 +13,7 @@ from ..jit import inlined, inner, kernel
 from ..robot.kinematics import FRAME
 from .capsule_placement import end_a, end_b, place_capsules
 from .clearance import first_joint, shifted
+from .hull_distance import asks_hull, asks_hulls, farthest_against, obstacle_hull_distance, pair_hull_distance
 from .proximity import between_segments, closest
 from .robot_arrays import CAPSULE, HEADER, NEAR_PAIR, PLACED, ROW, SETTING
 
@@ -33,7 +34,9 @@ def _lever_square(g, joint, p):
 
 @kernel
 def bound_motion(g, world, step):
-    """Bound the displacement [m] of all points of each capsule during a joint step, into the column PLACED.reach.
+    """Bound the displacement [m] of each capsule's core during a joint step, into the column PLACED.reach.
+
+    Points of a hull may be displaced by PLACED.swing more.
 
     A joint moves a point by its angle times the point's distance from the axis, and only joints after it change
     that distance. So the bound builds up from the capsule's own joint to the base.
@@ -55,11 +58,19 @@ def bound_motion(g, world, step):
                     square = max(_lever_square(g, joint, a), _lever_square(g, joint, b))
                     displacement += abs(step[joint]) * (math.sqrt(square) + displacement)
         g[world + c, PLACED.reach] = displacement
+        if g[ROW.body + c, CAPSULE.corners] > 0.0:
+            turning = 0.0
+            for joint in range(first, frame + 1):
+                turning += abs(step[joint]) if g[ROW.sliding, joint] == 0.0 else 0.0
+            # no point of what the capsule covers is farther from the core than the radius
+            g[world + c, PLACED.swing] = turning * g[ROW.body + c, CAPSULE.radius]
 
 
 @inner
-def _farthest_against(g, world, c, normal):
-    """Coordinate along the normal of the end of capsule c that lies farthest against the normal."""
+def _farthest(g, world, c, normal, hulls):
+    """Coordinate along the normal of the point of capsule c's core, or of its hull, that lies farthest against it."""
+    if hulls:
+        return farthest_against(g, world, c, normal)
     a, b = end_a(g, world + c), end_b(g, world + c)
     return min(
         normal[0] * a[0] + normal[1] * a[1] + normal[2] * a[2], normal[0] * b[0] + normal[1] * b[1] + normal[2] * b[2]
@@ -78,6 +89,25 @@ def _look(g, row, world, seconds):
     return distance - g[ROW.body + i, CAPSULE.radius], normal
 
 
+@inner
+def _look_at_hulls(g, row, world, seconds):
+    """Distance and normal of the hulls of a near pair, as `_look` gives those of the capsules."""
+    i, j = int(g[row, NEAR_PAIR.capsule]), int(g[row, NEAR_PAIR.other])
+    if g[row, NEAR_PAIR.self_pair] == 1.0:
+        distance, normal, _, _ = pair_hull_distance(g, world, i, j, math.inf)
+        return distance, normal
+    shift = shifted(g, j, (0.0, 0.0, 0.0), seconds)
+    distance, normal, _ = obstacle_hull_distance(g, world, i, j, shift, math.inf)
+    return distance, normal
+
+
+@inlined
+def _asks_hulls(g, row, slack):
+    """True if a near pair is so close that hulls decide."""
+    i, j = int(g[row, NEAR_PAIR.capsule]), int(g[row, NEAR_PAIR.other])
+    return asks_hulls(g, i, j, slack) if g[row, NEAR_PAIR.self_pair] == 1.0 else asks_hull(g, i, slack)
+
+
 @inlined
 def _speed(g, o):
     """Speed [m/s] of the obstacle in row o."""
@@ -86,45 +116,59 @@ def _speed(g, o):
 
 
 @inner
-def _other_displacement(g, row, start, end, normal, dt):
+def _other_displacement(g, row, start, end, normal, dt, hulls):
     """Displacement [m] of the other of a pair towards the capsule, along the normal, between two placements."""
     j = int(g[row, NEAR_PAIR.other])
     if g[row, NEAR_PAIR.self_pair] == 1.0:
         back = (-normal[0], -normal[1], -normal[2])
-        return _farthest_against(g, start, j, back) - _farthest_against(g, end, j, back)
+        return _farthest(g, start, j, back, hulls) - _farthest(g, end, j, back, hulls)
     o, v = ROW.obstacles + j, OBSTACLE.velocity
     return dt * (g[o, v] * normal[0] + g[o, v + 1] * normal[1] + g[o, v + 2] * normal[2])
 
 
+@inlined
+def _reach(g, c, hulls):
+    """Bound of the displacement [m] of a capsule's core, or of its hull, during the step."""
+    return g[ROW.placed + c, PLACED.reach] + (g[ROW.placed + c, PLACED.swing] if hulls else 0.0)
+
+
 @inner
-def _pair_stays_clear(g, row, margin, turning, start, dt):
+def _stays_clear(g, row, margin, turning, start, dt, hulls):
     """True if a near pair surely keeps its margin from ROW.placed to ROW.placed_next, `start` to `start + dt` from now.
 
     Either the two distances exceed the displacement in between (Lipschitz), or a plane that separates the pair at
     one end separates it at the other too, less the bend of the path of a capsule's end away from its chord: an
     eighth of its second derivative, which is at most twice the turning, of all joints together, times the
-    displacement.
+    displacement. With `hulls` distances and displacements are those of the hulls.
     """
     i, j = int(g[row, NEAR_PAIR.capsule]), int(g[row, NEAR_PAIR.other])
     now, then = ROW.placed, ROW.placed_next
-    displacement, other = g[now + i, PLACED.reach], 0.0
+    displacement, other = _reach(g, i, hulls), 0.0
     if g[row, NEAR_PAIR.self_pair] == 1.0:
-        displacement += g[now + j, PLACED.reach]
+        displacement += _reach(g, j, hulls)
     else:
         other = dt * _speed(g, ROW.obstacles + j)
-    distance, normal = _look(g, row, now, start)
-    distance_end, normal_end = _look(g, row, then, start + dt)
+    distance, normal = _look_at_hulls(g, row, now, start) if hulls else _look(g, row, now, start)
+    distance_end, normal_end = _look_at_hulls(g, row, then, start + dt) if hulls else _look(g, row, then, start + dt)
     if distance_end < margin or distance < margin:
         return False
     if distance + distance_end - displacement - other >= 2.0 * margin:
         return True
     bend = 0.25 * turning * displacement
-    forth = _farthest_against(g, then, i, normal) - _farthest_against(g, now, i, normal)
-    if min(distance, distance + forth - _other_displacement(g, row, now, then, normal, dt)) - bend >= margin:
+    forth = _farthest(g, then, i, normal, hulls) - _farthest(g, now, i, normal, hulls)
+    if min(distance, distance + forth - _other_displacement(g, row, now, then, normal, dt, hulls)) - bend >= margin:
         return True
-    back = _farthest_against(g, now, i, normal_end) - _farthest_against(g, then, i, normal_end)
-    other_back = _other_displacement(g, row, then, now, normal_end, -dt)
+    back = _farthest(g, now, i, normal_end, hulls) - _farthest(g, then, i, normal_end, hulls)
+    other_back = _other_displacement(g, row, then, now, normal_end, -dt, hulls)
     return min(distance_end, distance_end + back - other_back) - bend >= margin
+
+
+@inner
+def _pair_stays_clear(g, row, margin, turning, start, dt):
+    """True if a near pair surely keeps its margin, judged by its capsules or by its hulls."""
+    if _stays_clear(g, row, margin, turning, start, dt, False):
+        return True
+    return _asks_hulls(g, row, -math.inf) and _stays_clear(g, row, margin, turning, start, dt, True)
 
 
 @inner
@@ -173,7 +217,7 @@ def reach_of(g, step, dt):
     bound_motion(g, ROW.placed, step)
     displacement, fastest, margin = 0.0, 0.0, g[ROW.settings, SETTING.self_margin]
     for c in range(int(g[ROW.header, HEADER.capsules])):
-        displacement = max(displacement, g[ROW.placed + c, PLACED.reach])
+        displacement = max(displacement, g[ROW.placed + c, PLACED.reach] + g[ROW.placed + c, PLACED.swing])
     for o in range(ROW.obstacles, ROW.obstacles + int(g[ROW.header, HEADER.obstacles])):
         fastest = max(fastest, _speed(g, o))
         margin = max(margin, g[o, OBSTACLE.margin])
@@ -218,6 +262,10 @@ def near_pair_slack(g, world, seconds):
     """
     first, least = int(g[ROW.header, HEADER.first_near]), math.inf
     for row in range(first, first + int(g[ROW.header, HEADER.near])):
-        distance = g[row, NEAR_PAIR.distance] if world < 0 else _look(g, row, world, seconds)[0]
-        least = min(least, distance - g[row, NEAR_PAIR.margin])
+        distance, margin = g[row, NEAR_PAIR.distance], g[row, NEAR_PAIR.margin]
+        if world >= 0:
+            distance = _look(g, row, world, seconds)[0]
+            if distance - margin < least and _asks_hulls(g, row, distance - margin):
+                distance = max(distance, _look_at_hulls(g, row, world, seconds)[0])
+        least = min(least, distance - margin)
     return least

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import BadShape, NotFinite, UnfitShape
+from ..arrays import checked_array, checked_kind, frozen, numbers
+from ..errors import BadShape, UnfitShape, WrongType
 from .pose import Pose
 
 SMALLEST, LARGEST = 1e-6, 100.0
@@ -46,14 +47,16 @@ class ObstacleColumns(NamedTuple):
     vertices: int = 22  # number of vertices of a mesh
     own_margin: int = 23  # margin [m] of this obstacle; negative: the general margin
     packed: int = 24  # number of columns that `pack` fills
-    mask: int = 24  # capsules that may touch the obstacle, as bits of a number
-    margin: int = 25  # distance to keep [m]
+    mask: int = 24  # capsules that may touch the obstacle, as bits of numbers: 32 capsules in each of two columns
+    margin: int = 26  # distance to keep [m]
 
 
 SHAPE_KIND, OBSTACLE = ShapeKinds(), ObstacleColumns()
 
 
 def _length(shape: str, name: str, value: float) -> float:
+    if isinstance(value, str):
+        raise WrongType(f"{shape}: {name}", value, "a length [m]")
     number = float(value)
     if not math.isfinite(number) or not SMALLEST <= number <= LARGEST:
         raise UnfitShape(shape, name, f"{value!r} is not a length from {SMALLEST:g} to {LARGEST:g} m")
@@ -106,8 +109,9 @@ class Box:
     size: tuple[float, float, float]
 
     def __post_init__(self):
-        if len(self.size) != 3:
-            raise BadShape("box: size", np.shape(self.size), "(3,)")
+        size = numbers("box: size", self.size)
+        if size.shape != (3,):
+            raise BadShape("box: size", size.shape, "(3,)")
         x, y, z = (_length("box", f"size[{k}]", extent) for k, extent in enumerate(self.size))
         _set(self, size=(x, y, z))
 
@@ -142,12 +146,7 @@ class Mesh:
     vertices: np.ndarray
 
     def __post_init__(self):
-        points = np.array(self.vertices, dtype=np.float64)
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise BadShape("mesh: vertices", points.shape, "(n, 3)")
-        bad = np.argwhere(~np.isfinite(points))
-        if len(bad):
-            raise NotFinite("mesh: vertices", tuple(int(k) for k in bad[0]))
+        points = frozen(checked_array("mesh: vertices", self.vertices, (None, 3)))
         if not 4 <= len(points) <= MAX_VERTICES:
             raise UnfitShape("mesh", "vertices", f"there are {len(points)}; allowed are 4 to {MAX_VERTICES}")
         if np.abs(points).max() > LARGEST:
@@ -157,7 +156,6 @@ class Mesh:
             inside = int(np.setdiff1d(np.arange(len(points)), corners)[0])
             reason = f"vertex {inside} is no corner of the hull: the mesh is not convex; see Mesh.hull_of"
             raise UnfitShape("mesh", "vertices", reason)
-        points.flags.writeable = False
         _set(self, vertices=points)
 
     def __eq__(self, other: object) -> bool:
@@ -171,7 +169,7 @@ class Mesh:
     @staticmethod
     def hull_of(points: np.ndarray) -> Mesh:
         """Return the convex hull of points (n, 3) [m]."""
-        points = np.asarray(points, dtype=np.float64)
+        points = checked_array("mesh: vertices", points, (None, 3))
         return Mesh(points[hull_corners(points)])
 
 
@@ -216,15 +214,13 @@ class Obstacle:
     margin: float | None = None
 
     def __post_init__(self):
-        velocity = np.array(self.velocity, dtype=np.float64)
         label = f"obstacle {self.name!r}"
-        if velocity.shape != (3,):
-            raise BadShape(f"{label}: velocity", velocity.shape, "(3,)")
-        if not np.isfinite(velocity).all():
-            raise NotFinite(f"{label}: velocity", int(np.argmin(np.isfinite(velocity))))
+        velocity = frozen(checked_array(f"{label}: velocity", self.velocity, (3,)))
+        if not isinstance(self.shape, Shape):
+            raise WrongType(f"{label}: shape", self.shape, "a Sphere, Capsule, Box, Cylinder or Mesh")
+        checked_kind(f"{label}: pose", self.pose, Pose)
         if self.margin is not None and not 0.0 <= self.margin <= LARGEST:
             raise UnfitShape(label, "margin", f"{self.margin!r} is not a length from 0 to {LARGEST:g} m")
-        velocity.flags.writeable = False
         _set(self, velocity=velocity)
 
     def at(self, seconds: float) -> Obstacle:

@@ -14,12 +14,16 @@ import numpy as np
 
 from ..geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
 from ..robot.arm import Arm
-from ..robot.body import BODY, Body
+from ..robot.body import BODY, Body, Hull
 from ..robot.kinematics import CHAIN, REVOLUTE
 
 UNIT = 1e4
 """fcl works in tenths of millimeters: it stops at an absolute tolerance, so that distances to cylinders in meters
 are up to 0.2 mm too long, in this unit less than 1e-7 m (measured)."""
+
+
+ASKED = 0.05
+"""Distance [m] of a capsule below which its hull is asked."""
 
 
 class Moment(NamedTuple):
@@ -32,6 +36,7 @@ class Moment(NamedTuple):
         origins: (n, dof, 3) a point on each axis [m].
         ends: (n, m, 2, 3) ends of the capsules' cores [m].
         turns: (n, m, 3, 3) rotations of the capsules, z along the core.
+        places: (n, m, 4, 4) poses of the frames that the capsules move with; (n, 0, 4, 4) for a body without hulls.
         tool: (n, 4, 4) poses of the tcp.
     """
 
@@ -41,6 +46,7 @@ class Moment(NamedTuple):
     origins: np.ndarray
     ends: np.ndarray
     turns: np.ndarray
+    places: np.ndarray
     tool: np.ndarray
 
     def at(self, index: Any) -> Moment:
@@ -67,6 +73,7 @@ class Kinematics:
         self._frames = body.rows[:, BODY.frame].astype(int) + 1
         self._ends = np.stack([body.rows[:, BODY.a : BODY.b], body.rows[:, BODY.b : BODY.radius]], axis=1)
         self._turns = np.array([_turn_of(b - a) for a, b in self._ends]).reshape(-1, 3, 3)
+        self._has_hulls = any(hull is not None for hull in body.hulls)
 
     def _placement(self, row: np.ndarray) -> Any:
         w, x, y, z = row[CHAIN.rotation : CHAIN.offset] / np.linalg.norm(row[CHAIN.rotation : CHAIN.offset])
@@ -90,7 +97,8 @@ class Kinematics:
         ends = np.einsum("nmij,mej->nmei", mine[..., :3, :3], self._ends) + mine[..., None, :3, 3]
         turns = mine[..., :3, :3] @ self._turns
         axes, origins = frames[:, 1:, :3, 2], frames[:, 1:, :3, 3]
-        return Moment(time, joints, axes, origins, ends, turns, frames[:, -1] @ self._tool)
+        places = mine if self._has_hulls else mine[:, :0]
+        return Moment(time, joints, axes, origins, ends, turns, places, frames[:, -1] @ self._tool)
 
     def interpolated(self, path: np.ndarray, fractions: Sequence[np.ndarray]) -> np.ndarray:
         """Sample the screw motions through poses.
@@ -123,7 +131,8 @@ class CollisionWorld:
     """Capsules and obstacles in fcl.
 
     A capsule is queried by its core alone, as a capsule of radius 0, and the radius is subtracted afterwards: exact
-    as long as the core stays outside, whereas fcl's own answers in penetration are not distances.
+    as long as the core stays outside, whereas fcl's own answers in penetration are not distances. Where a capsule is
+    close, its hull is asked too: what the capsule covers lies in both, so the larger distance counts.
     """
 
     def __init__(self, body: Body, obstacles: Sequence[Obstacle]):
@@ -131,6 +140,8 @@ class CollisionWorld:
         self.radii = body.rows[:, BODY.radius]
         cores = [fcl.Sphere(0.0) if length < 1e-12 else fcl.Capsule(0.0, length * UNIT) for length in lengths]
         self._cores = [fcl.CollisionObject(core) for core in cores]
+        self.hulls = [hull is not None for hull in body.hulls] or [False] * len(body)
+        self._hulls = [None if hull is None else _hull_object(hull) for hull in body.hulls or [None] * len(body)]
         self._obstacles = [_object_of(obstacle) for obstacle in obstacles]
         self._request = fcl.DistanceRequest()
         self.velocities = np.array([o.velocity for o in obstacles]).reshape(-1, 3)
@@ -155,7 +166,21 @@ class CollisionWorld:
             core, obstacle = self._cores[k[c]], self._obstacles[o[c]]
             core.setTransform(fcl.Transform(turn, center))
             out[c] = fcl.distance(core, obstacle, self._request, fcl.DistanceResult())
-        return np.maximum(out / UNIT, 0.0) - self.radii[k]
+        out = np.maximum(out / UNIT, 0.0) - self.radii[k]
+        for c in np.flatnonzero(np.array(self.hulls)[k] & (out < ASKED)):
+            out[c] = max(out[c], self._hull_distance(moment, *cells[c]))
+        return out
+
+    def _hull_distance(self, moment: Moment, n: int, k: int, o: int) -> float:
+        """Distance [m] of a capsule's hull from an obstacle; minus infinity if they touch."""
+        known = self._hulls[k]
+        assert known is not None
+        hull, rounding = known
+        place = moment.places[n, k]
+        position = place[:3, 3] - moment.time[n] * self.velocities[o]
+        hull.setTransform(fcl.Transform(place[:3, :3], UNIT * position))
+        found = fcl.distance(hull, self._obstacles[o], self._request, fcl.DistanceResult()) / UNIT
+        return found - rounding if found > 0.0 else -np.inf
 
     def at_least(self, moment: Moment) -> np.ndarray:
         """Return lower bounds (n, m, k) of all distances [m]: from the core's center to a box around the obstacle."""
@@ -180,6 +205,11 @@ def _box_of(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(3), 0.5 * np.array(shape.size)
     ends = shape.radius if isinstance(shape, Capsule) else 0.0
     return np.zeros(3), np.array([shape.radius, shape.radius, 0.5 * shape.length + ends])
+
+
+def _hull_object(hull: Hull) -> tuple[Any, float]:
+    """Return a hull in fcl, in its own frame, and its rounding radius [m]."""
+    return fcl.CollisionObject(fcl_convex(UNIT * np.asarray(hull.corners))), hull.rounding
 
 
 def _object_of(obstacle: Obstacle) -> Any:

@@ -155,6 +155,16 @@ class Sweeper:
             stack += self._halved(batch)
         return self.found
 
+    def _swing(self, k: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Bound the displacement (c,) [m] of points of the hulls of capsules k beyond that of their cores.
+
+        No point of what a capsule covers is farther from its core than the radius.
+        """
+        turns = np.where(
+            (np.arange(len(self._kinds)) <= self._frames[k, None]) & (self._kinds == 0), np.abs(b - a), 0.0
+        )
+        return np.where(np.array(self._scene.hulls)[k], self._scene.radii[k], 0.0) * turns.sum(axis=1)
+
     def _record(self, cells: np.ndarray, times: np.ndarray, distances: np.ndarray) -> None:
         (_, k, o), found = cells.T, self.found
         np.minimum.at(found.sampled, (k, o), distances)
@@ -207,6 +217,7 @@ class Sweeper:
         for k, frame in enumerate(self._frames):
             starts, stops = (m._replace(ends=m.ends[:, k]) for m in (a, b))
             displacements[:, k] = travel(self._kinds, np.full(len(still), frame), starts, stops, still)
+            displacements[:, k] += self._swing(np.full(len(still), k), a.joints, b.joints)
         drift = np.abs(b.time - a.time)[:, None] * np.linalg.norm(self._scene.velocities, axis=1)
         bound = 0.5 * (distances[:-1] + distances[1:] - displacements[:, :, None] - drift[:, None])
         every = np.column_stack(np.unravel_index(np.arange(bound.size), bound.shape)).reshape(-1, 3)
@@ -230,7 +241,7 @@ class Sweeper:
         a, b, row = batch.a.at(n), batch.b.at(n), np.arange(len(n))
         shift = self._scene.velocities[o] * (b.time - a.time)[:, None]
         starts, stops = (m._replace(ends=m.ends[row, k]) for m in (a, b))
-        displacement = travel(self._kinds, self._frames[k], starts, stops, shift)
+        displacement = travel(self._kinds, self._frames[k], starts, stops, shift) + self._swing(k, a.joints, b.joints)
         bound = 0.5 * (batch.distances.sum(axis=1) - displacement)
         done = (
             (bound >= self._targets(batch.cells))

@@ -17,7 +17,7 @@ from ..errors import OneDemoError
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
 from ..robot.arm import Arm
-from ..robot.body import Body
+from ..robot.body import Body, Hull
 from ..strict_json import Refused, list_of, number_of, numbers_of, table_of, text_of, texts_of
 
 SHAPES: dict[str, type] = {"sphere": Sphere, "capsule": Capsule, "box": Box, "cylinder": Cylinder, "mesh": Mesh}
@@ -40,7 +40,15 @@ def content_of_arm(arm: Arm) -> dict[str, Any]:
 
 def content_of_body(body: Body) -> dict[str, Any]:
     """Return a body as JSON content."""
-    return {"rows": body.rows.tolist(), "names": list(body.names), "held": list(body.held)}
+    table: dict[str, Any] = {"rows": body.rows.tolist(), "names": list(body.names), "held": list(body.held)}
+    if body.hulls:
+        known = list({id(hull): hull for hull in body.hulls if hull is not None}.values())
+        place = {id(hull): k for k, hull in enumerate(known)}
+        table["hulls"] = [{"corners": np.asarray(h.corners).tolist(), "rounding": float(h.rounding)} for h in known]
+        table["hull_of"] = [-1 if hull is None else place[id(hull)] for hull in body.hulls]
+    if body.pairs is not None:
+        table["pairs"] = [list(pair) for pair in body.pairs]
+    return table
 
 
 @contextmanager
@@ -112,13 +120,44 @@ def body_of(value: Any) -> Body:
     Raises:
         Refused: anything else.
     """
-    table = table_of("body", value, ("rows", "names", "held"))
+    keys = [key for key in ("hulls", "hull_of", "pairs") if isinstance(value, dict) and key in value]
+    table = table_of("body", value, ("rows", "names", "held", *keys))
+    names = texts_of("body.names", table["names"])
+    pairs = None
+    if "pairs" in table:
+        pairs = tuple((int(i), int(j)) for i, j in _whole("body.pairs", table["pairs"], (None, 2)))
     with _blaming("body"):
         return Body(
             numbers_of("body.rows", table["rows"], (None, 8)),
-            texts_of("body.names", table["names"]),
+            names,
             texts_of("body.held", table["held"]),
+            _hulls(table, len(names)),
+            pairs,
         )
+
+
+def _hulls(table: dict[str, Any], count: int) -> tuple[Hull | None, ...]:
+    """The hulls of a body's capsules; () without any."""
+    if "hulls" not in table and "hull_of" not in table:
+        return ()
+    known: list[Hull | None] = []
+    for k, entry in enumerate(list_of("body.hulls", table.get("hulls"))):
+        key = f"body.hulls[{k}]"
+        hull = table_of(key, entry, ("corners", "rounding"))
+        corners = numbers_of(f"{key}.corners", hull["corners"], (None, 3))
+        known.append(Hull(corners, number_of(f"{key}.rounding", hull["rounding"])))
+    places = _whole("body.hull_of", table.get("hull_of"), (count,))
+    if len(places) and not (places.min() >= -1 and places.max() < len(known)):
+        raise Refused("body.hull_of", f"holds a number that is not from -1 to {len(known) - 1}")
+    return tuple([*known, None][k] for k in places)
+
+
+def _whole(key: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Whole numbers of a shape."""
+    numbers = numbers_of(key, value, shape)
+    if (numbers != np.round(numbers)).any():
+        raise Refused(key, "holds a number that is not whole")
+    return numbers.astype(int)
 
 
 def content_of_obstacle(obstacle: Obstacle) -> dict[str, Any]:

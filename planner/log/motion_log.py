@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import OneDemoError
+from ..arrays import checked_array, frozen
+from ..errors import BadShape, OneDemoError, WrongType
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
 from ..robot.arm import Arm
@@ -87,6 +88,13 @@ class MotionLog:
     def __post_init__(self):
         if self.format_version != FORMAT_VERSION:
             raise BadLog(None, "format_version", f"is {self.format_version!r}; this program knows {FORMAT_VERSION}")
+        kinds = {"arm": Arm, "body": Body, "goal": Pose | None, "demonstrated": PosePath | None}
+        for name, kind in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                raise BadLog(None, name, f"is a {type(getattr(self, name)).__name__}")
+        for k, obstacle in enumerate(self.obstacles):
+            if not isinstance(obstacle, Obstacle):
+                raise BadLog(None, f"obstacles[{k}]", f"is a {type(obstacle).__name__}, no obstacle")
         time = _checked("time", self.time, (None,))
         joints = _checked("joints", self.joints, (len(time), self.arm.dof))
         if not len(time):
@@ -207,14 +215,12 @@ def _number(key: str, value: Any) -> float:
 def _checked(key: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     """Return a read-only copy, checked for its shape and for finite, plausible numbers."""
     try:
-        array = np.array(value, dtype=np.float64)
-    except (ValueError, TypeError):
+        array = frozen(checked_array(key, value, shape, finite=False))
+    except WrongType:
         raise BadLog(None, key, "is not an array of numbers") from None
-    if array.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, array.shape, strict=True)):
-        wanted = " x ".join("any" if size is None else str(size) for size in shape)
-        raise BadLog(None, key, f"has shape {array.shape}; expected {wanted}")
+    except BadShape as error:
+        raise BadLog(None, key, f"has shape {error.shape}; expected {error.expected}") from None
     bad = np.argwhere(~(np.abs(array) <= FARTHEST))
     if len(bad):
         raise BadLog(None, f"{key}[{bad[0][0]}]", f"is not finite, or above {FARTHEST:g}")
-    array.flags.writeable = False
     return array

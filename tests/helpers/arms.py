@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +11,30 @@ from helpers.strategies import random_dq
 
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.robot.arm import Arm
+from onedemo.planner.robot.body import Body
+
+MODELS = Path(__file__).parent.parent / "models"
+"""Models of the tests' own: the planner is tested where no simulator is installed."""
+
+
+def panda_urdf() -> Path:
+    """The Panda, with cylinders in place of its meshes."""
+    return MODELS / "panda.urdf"
 
 
 @cache
-def panda_urdf() -> Path:
-    """The description that robosuite ships, found without importing it."""
-    folder = Path(find_spec("robosuite").origin).parent / "models/assets/bullet_data/panda_description/urdf"
-    return folder / "panda_arm.urdf"
+def table_panda() -> tuple[Arm, Body, np.ndarray]:
+    """The Panda as it stands at the tasks' table: arm, capsules, usual joints."""
+    table = json.loads((MODELS / "panda_at_table.json").read_text(encoding="utf-8"))
+    arm = Arm(
+        table["name"],
+        tuple(table["joint_names"]),
+        np.array(table["chain"]),
+        np.array(table["lower"]),
+        np.array(table["upper"]),
+        np.array(table["velocity_limits"]),
+    )
+    return arm, Body(np.array(table["capsules"]), tuple(table["parts"])), np.array(table["home"])
 
 
 @cache

@@ -16,14 +16,12 @@ from typing import NamedTuple
 
 import fcl
 import numpy as np
+from helpers.arms import table_panda
 from helpers.solids import KINDS as SHAPES
 from helpers.solids import fcl_distance, fcl_obstacle, random_shape
 from helpers.strategies import random_dq
 
 from onedemo.configs.shipped_files import shipped_demonstration
-from onedemo.envs import ROBOTS
-from onedemo.envs.scene.robot_bodies import robot_body
-from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Obstacle, Shape
@@ -72,11 +70,9 @@ class Problem(NamedTuple):
     posture: np.ndarray | None
 
 
-@cache
 def panda() -> tuple[Arm, Body, np.ndarray]:
     """The Panda as it stands at the table: arm, capsules, usual joints."""
-    scene = compiled_scene(ROBOTS["Panda"])
-    return scene.arms[0].arm, robot_body(ROBOTS["Panda"]), scene.home[0]
+    return table_panda()
 
 
 @cache

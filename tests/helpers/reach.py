@@ -33,7 +33,8 @@ from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import resampled
 from onedemo.planner.imitation.tsia import final_path, guide_index, imitated_path
 from onedemo.planner.robot.body import Body
-from onedemo.planner.safety.safety_layer import SafetySettings, contact_masks
+from onedemo.planner.safety.robot_checks import contact_masks
+from onedemo.planner.safety.safety_layer import SafetySettings
 
 MARGIN = 0.08
 """Distance to the joints' limits [rad] that is kept everywhere."""

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Shape, Sphere
-from onedemo.planner.robot.body_readers import segment_distance
+from onedemo.planner.robot.resting_pairs import segment_distance
 
 KINDS = ("sphere", "capsule", "box", "cylinder", "mesh")
 

@@ -54,6 +54,8 @@ CLOSED = ("safety_layer", "closed_form or along_a_surface or rises")
 GUARD = ("safety_layer", "jumped_over or margin_goes_before or too_close_is_left")
 LIMITS = ("safety_layer", "limits_are_never or pushed or beyond_a_limit")
 MOVING = ("safety_layer", "sphere")
+HULL = ("hull_distance", "of_fcl or slack_is_exact")
+HULL_STEP = ("hull_distance", "proven_step or proven_motion")
 
 BUGS = [
     Bug(
@@ -109,8 +111,8 @@ BUGS = [
     ),
     Bug(
         "distance of polytopes not proven",
-        "collision/gjk",
-        "proven = max(0.0, _dot(v, w) / length)",
+        "geometry/gjk",
+        "proven = max(0.0, dot(v, w) / length)",
         "proven = length",
         ("proximity", "proven_from_below"),
     ),
@@ -167,8 +169,8 @@ BUGS = [
     Bug(
         "mask of the wrong obstacle",
         "collision/capsule_placement",
-        "int(g[ROW.obstacles + obstacle, OBSTACLE.mask])",
-        "int(g[ROW.obstacles, OBSTACLE.mask])",
+        "g[ROW.obstacles + obstacle, OBSTACLE.mask",
+        "g[ROW.obstacles, OBSTACLE.mask",
         MASKED,
     ),
     Bug(
@@ -252,15 +254,15 @@ BUGS = [
     Bug(
         "sign of the bound",
         "safety/barrier",
-        "g[k, NEAR_PAIR.t]), normal, 1.0)",
-        "g[k, NEAR_PAIR.t]), normal, -1.0)",
+        "NEAR_PAIR.point), normal, 1.0)",
+        "NEAR_PAIR.point), normal, -1.0)",
         ROWS,
     ),
     Bug(
         "sign of the other capsule",
         "safety/barrier",
-        "g[k, NEAR_PAIR.s]), normal, -1.0)",
-        "g[k, NEAR_PAIR.s]), normal, 1.0)",
+        "NEAR_PAIR.other_point), normal, -1.0)",
+        "NEAR_PAIR.other_point), normal, 1.0)",
         ROWS,
     ),
     Bug(
@@ -273,8 +275,8 @@ BUGS = [
     Bug(
         "closest point at the wrong end",
         "safety/barrier",
-        "_on_core(g, i, g[k, NEAR_PAIR.t])",
-        "_on_core(g, i, 1.0 - g[k, NEAR_PAIR.t])",
+        "_on_core(g, c, g[k, t])",
+        "_on_core(g, c, 1.0 - g[k, t])",
         ROWS,
     ),
     Bug(
@@ -403,8 +405,8 @@ BUGS = [
     Bug(
         "screw goes on too far",
         "collision/edge_certificates",
-        "stretch = slack / speed",
-        "stretch = 3.0 * slack / speed",
+        "part = slack / speed",
+        "part = 3.0 * slack / speed",
         EDGE,
     ),
     Bug(
@@ -420,6 +422,34 @@ BUGS = [
         "return screw.cross(v, normal), v",
         "return screw.cross(normal, v), v",
         ("proximity", "basis_of_a_plane"),
+    ),
+    Bug(
+        "distance of hulls not proven",
+        "geometry/convex_distance",
+        "return proven, normal, blend",
+        "return math.sqrt(dot(v, v)) + 1e-3, normal, blend",
+        HULL,
+    ),
+    Bug(
+        "rounding of a hull dropped",
+        "collision/hull_distance",
+        "less = rounding + g[o, OBSTACLE.rounding]",
+        "less = g[o, OBSTACLE.rounding]",
+        HULL,
+    ),
+    Bug(
+        "touching hulls are clear",
+        "collision/hull_distance",
+        "(core - less if core > 0.0 else NONE), normal, point",
+        "(core - less if core > 0.0 else 1.0), normal, point",
+        HULL,
+    ),
+    Bug(
+        "hulls move no farther than cores",
+        "collision/step_certificates",
+        "= turning * g[ROW.body + c, CAPSULE.radius]",
+        "= -turning * g[ROW.body + c, CAPSULE.radius]",
+        HULL_STEP,
     ),
 ]
 

@@ -83,11 +83,8 @@ def test_the_planner_pours_what_it_holds_from_the_start():
     env.close()
 
 
-UR5E = pytest.param("UR5e", marks=[pytest.mark.slow, pytest.mark.xfail(strict=True, reason="see docs/robots.md")])
-
-
 @pytest.mark.parametrize(
-    "robot", ["Baxter", UR5E, *(pytest.param(r, marks=pytest.mark.slow) for r in ("Sawyer", "IIWA", "Kinova3"))]
+    "robot", ["Baxter", "UR5e", *(pytest.param(r, marks=pytest.mark.slow) for r in ("Sawyer", "IIWA", "Kinova3"))]
 )
 def test_other_robots_pour_from_the_same_demonstration(robot):
     env = gym.make("onedemo/Pour-v0", robot=robot)

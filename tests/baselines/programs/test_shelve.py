@@ -58,11 +58,8 @@ def test_a_book_that_hangs_in_the_hand_goes_in_along_a_level_way():
     assert (record.success, record.safe, record.failure_reason) == (True, True, "")
 
 
-UR5E = pytest.param("UR5e", marks=pytest.mark.xfail(strict=True, reason="see docs/robots.md"))
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["Baxter", "Sawyer", "IIWA", UR5E])
+@pytest.mark.parametrize("robot", ["Baxter", "Sawyer", "IIWA", "UR5e"])
 def test_other_robots_shelve_from_the_same_demonstration(robot):
     record = shelved(0, "L1", robot=robot)
     assert (record.success, record.safe, record.failure_reason) == (True, True, "")

@@ -199,9 +199,8 @@ def test_bounds_of_two_arms_move_only_the_joints_of_their_own():
     """Both Pandas, against an obstacle and against each other."""
     robot, rng = facing_pandas(), np.random.default_rng(0)
     ball = Obstacle(Sphere(0.1), Pose.from_position_quaternion([0.4, 0, 0.4]))
-    g = robot_arrays(
-        robot.arms, robot.bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SAFETY.packed(0.01)
-    )
+    bodies = [Body(body.rows, body.names) for body in robot.bodies]
+    g = robot_arrays(robot.arms, bodies, pack([ball]), pairs=robot.pairs, margin=0.01, settings=SAFETY.packed(0.01))
     checked = 0
     for _ in range(5):
         q = rng.uniform(g[ROW.lower, :14], g[ROW.upper, :14])

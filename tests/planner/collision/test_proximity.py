@@ -12,12 +12,12 @@ from helpers.solids import KINDS, fcl_capsule, fcl_distance, fcl_obstacle, rando
 from helpers.strategies import directions, for_all
 from hypothesis import strategies as st
 
-from onedemo.planner.collision.gjk import segment_polytope
 from onedemo.planner.collision.proximity import between_segments, closest, distance, is_beyond
 from onedemo.planner.escape.tangent_plane import plane_basis
+from onedemo.planner.geometry.gjk import segment_polytope
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere, pack
-from onedemo.planner.robot.body_readers import segment_distance
+from onedemo.planner.robot.resting_pairs import segment_distance
 
 seeds, kinds = st.integers(0, 10**6), st.sampled_from(KINDS)
 CUBE = Mesh(np.array(list(itertools.product((-0.1, 0.1), repeat=3))))

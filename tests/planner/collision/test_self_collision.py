@@ -7,30 +7,40 @@ import numpy as np
 import pytest
 from helpers.random_scenes import SETTINGS, demonstrated, panda, problem, solve
 
-from onedemo.envs import ROBOTS
-from onedemo.envs.scene.scene import ARM, FINGERS, compiled_scene
 from onedemo.planner.collision.self_collision import body_pairs
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
-from onedemo.planner.robot.body_readers import resting_pairs
+from onedemo.planner.robot.resting_pairs import resting_pairs
 
+OWN = (1, 2)
+"""Numbers of the arm's and the fingers' geoms in a simulated scene."""
 FOLDED = np.array([1.22, 1.17, -2.16, -2.73, 2.41, 0.67, -0.48])
 """The hand on the forearm [rad]: a search in joint space once led there."""
 
 
+def simulated():
+    """The robot as the tasks simulate it, where its simulator is installed."""
+    pytest.importorskip("robosuite")
+    from onedemo.envs import ROBOTS
+    from onedemo.envs.scene import scene
+
+    assert OWN == (scene.ARM, scene.FINGERS)
+    return scene.compiled_scene(ROBOTS["Panda"])
+
+
 def contacts_with_itself(q):
     """Pairs of geoms of the robot that MuJoCo says touch at joints q (7,)."""
-    scene = compiled_scene(ROBOTS["Panda"])
+    scene = simulated()
     data = mujoco.MjData(scene.model)
     data.qpos[scene.arms[0].qpos] = q
     data.qpos[scene.arms[0].finger_qpos] = scene.arms[0].finger_open
     mujoco.mj_forward(scene.model, data)
     pairs = data.contact.geom[: data.ncon]
-    return [pair for pair in pairs if np.isin(scene.owner[pair], (ARM, FINGERS)).all() and not within_gripper(pair)]
+    return [pair for pair in pairs if np.isin(scene.owner[pair], OWN).all() and not within_gripper(pair)]
 
 
 def within_gripper(pair):
-    model = compiled_scene(ROBOTS["Panda"]).model
+    model = simulated().model
     return all("gripper" in model.body(int(body)).name for body in model.geom_bodyid[pair])
 
 

@@ -34,7 +34,7 @@ from soak import (
 from onedemo.planner import jit
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.collision.robot_arrays import HEADER, NEAR_PAIR, ROW
-from onedemo.planner.errors import BadOption, BadShape, UnknownName
+from onedemo.planner.errors import BadModel, BadOption, BadShape, NotFinite, UnknownName, WrongType
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
 from onedemo.planner.robot.arm import Arm
@@ -502,8 +502,19 @@ def test_bad_calls_are_refused_by_name():
         layer(np.zeros(7), np.zeros(3))
     with pytest.raises(BadShape, match="safety: velocity"):
         layer(np.zeros(3), np.zeros((1, 3)))
-    with pytest.raises(BadOption, match="joint 1 is not finite"):
+    with pytest.raises(NotFinite, match=r"safety: q .* at index 1"):
         layer([0.0, np.nan, 0.0], np.zeros(3))
     with pytest.raises(BadOption, match="3 arms"):
         SafetyLayer([gantry()] * 3, [BALL] * 3, [], DT)
+    with pytest.raises(BadModel, match="robot: bodies: there are 2 for 1 arms"):
+        SafetyLayer([gantry()], [BALL] * 2, [], DT)
+    foreign = Body(np.array([[7.0, 0, 0, 0, 0, 0, 0, 0.01]]), ("hand",))
+    with pytest.raises(BadModel, match=r"body: hand: moves with joint 7; .* has joints 0 to 2"):
+        SafetyLayer([gantry()], [foreign], [], DT)
+    for pair in ((0, 1), (-1, 0), (0, 0.5), (0, 1e9)):
+        with pytest.raises(BadOption, match=r"pair 0 names capsule .*; there are capsules 0 to 0"):
+            SafetyLayer([gantry()], [BALL], [], DT, pairs=[pair])
+    for allowed in ([("hand",)], ["ab"], [("hand", 3)]):
+        with pytest.raises(WrongType, match=r"allowed\[0\] is .*; expected a pair of names"):
+            SafetyLayer([gantry()], [BALL], [], DT, allowed=allowed)
     assert TALLY == 12

@@ -1,0 +1,1 @@
+"""Readers of robot models and the fitting of bodies: capsules and hulls that contain the links."""

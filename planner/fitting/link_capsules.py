@@ -1,0 +1,131 @@
+"""The body of a robot: capsules, and hulls in them, that contain its parts.
+
+Parts attached by joints that are not the arm's, like a gripper's fingers, are covered over the whole range of those
+joints.
+
+Not in the paper: the paper moves a point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import BadModel, UnfitShape, UnknownName
+from ..geometry.capsule_cover import fitted_capsules, strips
+from ..geometry.convex_pieces import rounded_hull
+from ..geometry.hulls import Cover, sticks_out, union_volume
+from ..geometry.pose import Pose
+from ..robot.arm import Arm
+from ..robot.body import MAX_CAPSULES, Body, Hull
+from ..robot.joint_frames import joint_frames, moved
+from .link_pieces import Piece, convex_link_pieces, whole_pieces
+from .mesh_distances import MeshDistances
+from .refined_pieces import refined
+from .robot_model import RobotModel, world_from_parts
+from .self_contacts import possible_contacts
+
+Split = int | Mapping[str, int] | None
+SMALLER, CLOSER = 0.85, 0.75
+"""A link gets one more capsule if that reduces the volume, or the protrusion, to less than this fraction."""
+FINGER_EXCESS = 0.006
+"""Approximate largest protrusion [m] of finger capsules, small because fingers go close to objects."""
+SAME = 1e-6
+"""Tolerance [m, rad] within which joints of a model and of the arm coincide."""
+BULGES = (1.02, 1.25, 2.0, 5.0, np.inf)
+"""Volumes of a hull of several elements, as multiples of theirs, that are tried until the pieces are few enough."""
+ROUNDING = 5e-4
+"""Largest distance [m] that the hull of a piece with many corners may stand off the piece."""
+
+
+def body_of(robot: RobotModel, arm: Arm, split: Split, *, exact: bool = True) -> Body:
+    """Cover a robot's parts, named and placed as `body_readers` describes.
+
+    Args:
+        robot: the model that was read.
+        arm: the arm, read from the same model.
+        split: number of capsules (1 to 3) of every piece, or of some pieces by name; None: as many as pay off.
+        exact: add convex hulls, and find out which parts can hit each other; False: capsules alone.
+
+    Raises:
+        BadModel: another arm, no collision geometry, or geometry that encloses no volume.
+        UnknownName: a piece in `split` that the arm lacks.
+    """
+    world = world_from_parts(robot.parts)
+    frames = [Pose.identity(), *joint_frames(arm, robot.reference)]
+    _check_same(robot, arm, world, frames)
+    covering = _Covering(robot.source, split)
+    if not exact:
+        return covering.body(whole_pieces(robot, world, frames), hulls=False)
+    pieces: list[Piece] = []
+    for bulge in BULGES:
+        pieces = convex_link_pieces(robot, world, frames, bulge)
+        if len(pieces) <= MAX_CAPSULES:
+            break
+    truth = MeshDistances(arm, pieces)
+    return possible_contacts(arm, refined(arm, pieces, truth, covering.body, MAX_CAPSULES), truth)
+
+
+def _check_same(robot: RobotModel, arm: Arm, world: list[Pose], frames: list[Pose]) -> None:
+    """Refuse an arm that was not read from the model."""
+    for name, frame, (part, axis, position) in zip(arm.joint_names, frames[1:], robot.joints, strict=True):
+        direction = frame.rotation[:, 2]
+        off = np.cross(moved(world[part], position) - frame.position, direction)
+        if np.abs(world[part].rotation @ axis - direction).max() > SAME or np.abs(off).max() > SAME:
+            raise BadModel(robot.source, name, f"is not where the arm {arm.name!r} has it: they are not the same")
+
+
+class _Covering:
+    """Covers pieces, every piece once: cutting one leaves the others as they are."""
+
+    def __init__(self, source: str, split: Split):
+        self._source, self._split = source, split
+        self._known: dict[tuple[int, bool], tuple[Piece, Cover, Hull | None]] = {}
+
+    def body(self, pieces: list[Piece], *, hulls: bool = True) -> Body:
+        """Return the body of pieces; with hulls, and with one capsule per piece if more would be too many."""
+        names = {piece.name for piece in pieces}
+        if isinstance(self._split, Mapping) and set(self._split) - names:
+            raise UnknownName("link to split", min(set(self._split) - names), sorted(names))
+        covers = [self._of(piece, few=False) for piece in pieces]
+        if hulls and sum(len(cover) for cover, _ in covers) > MAX_CAPSULES:
+            covers = [self._of(piece, few=True) for piece in pieces]
+        rows, labels, laid = [], [], []
+        for piece, (cover, hull) in zip(pieces, covers, strict=True):
+            for a, b, radius in cover:
+                rows.append([piece.frame, *moved(piece.pose, a), *moved(piece.pose, b), radius])
+                labels.append(piece.name)
+                laid.append(hull)
+        if not rows:
+            raise BadModel(self._source, "collision geometry", "the arm has none")
+        return Body(np.array(rows), tuple(labels), hulls=tuple(laid) if hulls else ())
+
+    def _of(self, piece: Piece, *, few: bool) -> tuple[Cover, Hull | None]:
+        key = id(piece), few
+        if key not in self._known:
+            points = piece.geometry.points
+            hull = Hull(*rounded_hull(moved(piece.pose, points), ROUNDING)) if len(points) else None
+            self._known[key] = piece, _cover(piece, 1 if few else self._split, self._source), hull
+        return self._known[key][1:]
+
+
+def _cover(piece: Piece, split: Split, source: str) -> Cover:
+    exact, points = piece.geometry.exact, piece.geometry.points
+    if not len(points):
+        return exact
+    count = split.get(piece.name) if isinstance(split, Mapping) else split
+    try:
+        if count is not None:
+            return exact + fitted_capsules(points, count)
+        if piece.name == "fingers":
+            return exact + strips(points, FINGER_EXCESS)
+        fit, pays = fitted_capsules(points, 1), True
+        while pays and len(fit) < 3:
+            finer = fitted_capsules(points, len(fit) + 1)
+            pays = union_volume(finer) < SMALLER * union_volume(fit)
+            pays = pays or sticks_out(finer, points) < CLOSER * sticks_out(fit, points)
+            fit = finer if pays else fit
+    except UnfitShape as error:
+        raise BadModel(source, piece.name, f"cannot be covered: {error.reason}") from None
+    return exact + fit

@@ -1,0 +1,105 @@
+"""A robot model as its readers describe it: parts, the joints between them, and their geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..geometry.hulls import Cover
+from ..geometry.pose import Pose
+from ..robot.joint_frames import moved
+
+
+class Joint(NamedTuple):
+    """A joint that does not belong to the arm, in the frame of its part.
+
+    Attributes:
+        kind: REVOLUTE, PRISMATIC or NaN for any other.
+        axis: (3,) unit.
+        position: (3,) a point on the axis [m].
+        low: lowest position relative to the reference [rad or m]; -inf without a limit.
+        high: highest position relative to the reference [rad or m]; inf without a limit.
+    """
+
+    kind: float
+    axis: np.ndarray
+    position: np.ndarray
+    low: float
+    high: float
+
+
+class Geometry(NamedTuple):
+    """Geometry of a part, in its frame.
+
+    Attributes:
+        exact: capsules, and balls as capsules with coincident ends.
+        points: (n, 3) [m]; their hull contains all other geometry.
+        triangles: (k, 3, 3) of its surface [m], if it is a mesh that need not be convex; else none.
+    """
+
+    exact: Cover
+    points: np.ndarray
+    triangles: np.ndarray = np.zeros((0, 3, 3))
+
+
+class BodyPart(NamedTuple):
+    """A part of a robot: geometry that moves as one.
+
+    Attributes:
+        name: in the model, for messages.
+        parent: index of the part this one is attached to, lower than its own; -1: the world.
+        pose: `parent_from_part` with all joints at the reference.
+        frame: index of the arm's joint that moves the part, -1 for the arm's base; None: not a link of the arm.
+        joints: other joints that move the part, nearest to the parent first.
+        geometry: of the part, one entry per collision element.
+    """
+
+    name: str
+    parent: int
+    pose: Pose
+    frame: int | None
+    joints: tuple[Joint, ...]
+    geometry: tuple[Geometry, ...]
+
+
+class RobotModel(NamedTuple):
+    """A robot model as read from a file or a compiled model.
+
+    Attributes:
+        source: for messages.
+        parts: parents first.
+        reference: (dof,) positions of the arm's joints at which the parts' poses hold [rad or m].
+        joints: per joint of the arm: index of its part, axis (3,) and a point on the axis (3,) in the part's frame [m].
+    """
+
+    source: str
+    parts: list[BodyPart]
+    reference: np.ndarray
+    joints: list[tuple[int, np.ndarray, np.ndarray]]
+
+
+def joined(geometries: Sequence[Geometry]) -> Geometry:
+    """Merge several geometries of one frame."""
+    exact = [capsule for geometry in geometries for capsule in geometry.exact]
+    return Geometry(exact, np.vstack([np.zeros((0, 3)), *(geometry.points for geometry in geometries)]))
+
+
+def placed(a_from_b: Pose, geometry: Geometry) -> Geometry:
+    """Transform geometry from frame b to frame a.
+
+    Args:
+        a_from_b: pose of b in a.
+        geometry: in frame b.
+    """
+    exact = [(moved(a_from_b, a), moved(a_from_b, b), radius) for a, b, radius in geometry.exact]
+    return Geometry(exact, moved(a_from_b, geometry.points), moved(a_from_b, geometry.triangles))
+
+
+def world_from_parts(parts: Sequence[BodyPart]) -> list[Pose]:
+    """Return the poses of all parts in the world, with all joints at the reference."""
+    world: list[Pose] = []
+    for part in parts:
+        world.append(part.pose if part.parent < 0 else world[part.parent] @ part.pose)
+    return world

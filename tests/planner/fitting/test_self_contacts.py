@@ -1,0 +1,200 @@
+"""Self-contact by the truth: the surfaces of the model's meshes, placed and measured by Pinocchio."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from helpers.arms import panda, panda_urdf
+from helpers.strategies import for_all
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+
+from onedemo.planner import Arm, Body, Pose, body_from_urdf
+from onedemo.planner.collision.clearance import slack_at
+from onedemo.planner.collision.hull_distance import CLOSE
+from onedemo.planner.collision.robot_arrays import robot_arrays
+from onedemo.planner.fitting.self_contacts import survey_of
+from onedemo.planner.geometry.convex_pieces import best_cut, cut_off, rounded_hull, to_triangles
+from onedemo.planner.geometry.shapes import MAX_VERTICES, pack
+
+LESS = 0.003
+"""Distance [m] by which the arm's own parts may seem closer than they are."""
+MARGIN = 0.01
+
+
+@cache
+def panda_with_hulls() -> Body:
+    return body_from_urdf(panda_urdf(), panda())
+
+
+class Meshes:
+    """The collision meshes of the Panda's links, by the name of the body's part."""
+
+    def __init__(self):
+        path = str(panda_urdf())
+        folders = [str(folder) for folder in panda_urdf().resolve().parents]
+        self.model = pin.buildModelFromUrdf(path)
+        self.geometry = pin.buildGeomFromUrdf(self.model, path, pin.COLLISION, package_dirs=folders)
+        self.data, self.placed = self.model.createData(), self.geometry.createData()
+        self.names = [f"link{int(item.parentJoint)}" for item in self.geometry.geometryObjects]
+
+    def watch(self, pairs: set[tuple[str, str]]) -> None:
+        for i, one in enumerate(self.names):
+            for j in range(i + 1, len(self.names)):
+                if (one, self.names[j]) in pairs:
+                    self.geometry.addCollisionPair(pin.CollisionPair(i, j))
+        self.placed = self.geometry.createData()
+
+    def distances(self, q: np.ndarray) -> dict[tuple[str, str], float]:
+        pin.computeDistances(self.model, self.data, self.geometry, self.placed, q)
+        out: dict[tuple[str, str], float] = {}
+        for pair, result in zip(self.geometry.collisionPairs, self.placed.distanceResults, strict=True):
+            names = self.names[pair.first], self.names[pair.second]
+            out[names] = min(out.get(names, np.inf), result.min_distance)
+        return out
+
+
+def own_distances(body: Body, survey, k: int) -> dict[tuple[str, str], float]:
+    """Distances of the parts whose contact is checked, in a posture of a survey."""
+    kept, out = set(body.pairs), {}
+    for (i, j), distance in zip(survey.pairs, survey.distances[k], strict=True):
+        if (int(i), int(j)) in kept:
+            names = body.names[i], body.names[j]
+            out[names] = min(out.get(names, np.inf), distance)
+    return out
+
+
+def test_the_distance_is_never_more_than_the_truth_and_hardly_less():
+    body, meshes = panda_with_hulls(), Meshes()
+    survey = survey_of(panda(), body, 300)
+    meshes.watch({(body.names[i], body.names[j]) for i, j in body.pairs})
+    close = clear = refused = 0
+    for k, q in enumerate(survey.postures):
+        true, mine = meshes.distances(q), own_distances(body, survey, k)
+        assert true.keys() == mine.keys()
+        for names, distance in true.items():
+            if 0.0 < distance < CLOSE:
+                assert mine[names] <= distance + 1e-6, names
+                # hulls that touch have no distance, so that of the capsules counts
+                assert max(mine[names], 0.0) >= distance - LESS, names
+                close += 1
+            elif distance <= 0.0:
+                assert mine[names] <= 0.0, names
+        if min(true.values()) >= MARGIN:
+            clear += 1
+            refused += min(mine.values()) < MARGIN
+    assert close > 20 and clear > 50 and refused <= 0.05 * clear
+
+
+def test_few_parts_of_the_panda_can_hit_each_other():
+    body = panda_with_hulls()
+    names = {(body.names[i], body.names[j]) for i, j in body.pairs}
+    assert {("link0", "link6"), ("link2", "link7"), ("link5", "link7")} <= names
+    # the elbow keeps them apart
+    assert not {("link1", "link3"), ("link2", "link4"), ("link4", "link6"), ("link0", "link2")} & names
+    assert len(body.hulls) == len(body) and all(hull is not None for hull in body.hulls)
+
+
+BOX = '<collision><origin xyz="0 0 {z}"/><geometry><box size="{size}"/></geometry></collision>'
+BOOM = f"""<robot name="boom">
+<link name="base">{BOX.format(z=0, size="0.1 0.1 0.1")}</link>
+<link name="lower">{BOX.format(z=0.15, size="0.04 0.04 0.3")}</link>
+<link name="upper">{BOX.format(z=0.15, size="0.04 0.04 0.3")}</link>
+<link name="bracket">{BOX.format(z=-0.02, size="0.1 0.1 0.02")}</link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="lower"/><origin xyz="0 0 {{height}}"/>
+<axis xyz="0 1 0"/><limit lower="-1.5" upper="1.5" effort="1" velocity="1"/></joint>
+<joint name="fold" type="revolute"><parent link="lower"/><child link="upper"/><origin xyz="0 {{aside}} 0.3"/>
+<axis xyz="0 1 0"/><limit lower="-{{fold}}" upper="{{fold}}" effort="1" velocity="1"/></joint>
+<joint name="roll" type="revolute"><parent link="upper"/><child link="bracket"/><origin xyz="0 0 0.3"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    "changes, meet",
+    [
+        ({"fold": 3.1}, {("link0", "link2"), ("link0", "link3"), ("link1", "link3")}),
+        # folded by a right angle at most, nothing reaches back
+        ({"fold": 1.5}, set()),
+        # beside the lower arm, the upper one passes it and the bracket still hits it
+        ({"fold": 3.1, "aside": 0.06}, {("link0", "link2"), ("link0", "link3"), ("link1", "link3")}),
+        ({"fold": 3.1, "aside": 0.2}, set()),
+        # on a high post, the bracket alone reaches the base
+        ({"fold": 3.1, "height": 0.35}, {("link1", "link3")}),
+    ],
+)
+def test_parts_are_checked_if_they_can_meet(tmp_path, changes, meet):
+    values = {"fold": 3.1, "aside": 0.0, "height": 0.1, **changes}
+    path = tmp_path / "boom.urdf"
+    path.write_text(BOOM.format(**values))
+    arm = Arm.from_urdf(path, tcp_frame="bracket")
+    body = body_from_urdf(path, arm)
+    assert {(body.names[i], body.names[j]) for i, j in body.pairs} == meet
+
+
+def tube(outer: float = 0.05, inner: float = 0.04, length: float = 0.3, wings: float = 0.2) -> np.ndarray:
+    """Triangles of a thin rod with a wide plate at each end: its hull stands off the rod."""
+
+    def box(x: float, y: float, low: float, high: float) -> np.ndarray:
+        corners = np.array([[a, b, c] for a in (-x, x) for b in (-y, y) for c in (low, high)])
+        return corners[ConvexHull(corners).simplices]
+
+    plates = [box(wings, wings, 0.0, 0.02), box(wings, wings, length - 0.02, length)]
+    return np.concatenate([box(inner, outer, 0.0, length), *plates])
+
+
+def test_a_cut_takes_a_hull_back_from_a_hollow():
+    triangles = tube()
+    hollow = np.array([[0.2, 0.0, 0.15], [0.0, -0.2, 0.12]])
+    sides = best_cut(triangles, hollow)
+    assert len(sides) == 2
+    for side in sides:
+        assert to_triangles(side.reshape(-1, 3), triangles).max() < 1e-9
+    again = [part for side in sides for part in (best_cut(side, hollow) or [side])]
+    planes = [ConvexHull(part.reshape(-1, 3)).equations for part in again]
+    beyond = [(hollow @ p[:, :3].T + p[:, 3]).max(axis=1) for p in planes]
+    assert np.min(beyond, axis=0).min() > 0.05
+    assert best_cut(triangles, np.array([[0.2, 0.2, 0.0]])) == []
+
+
+@for_all(st.integers(0, 10**6), max_examples=40)
+def test_both_sides_of_a_cut_are_the_whole(seed):
+    rng = np.random.default_rng(seed)
+    triangles = rng.normal(size=(12, 3, 3))
+    normal = rng.normal(size=3)
+    normal, height = normal / np.linalg.norm(normal), float(rng.normal())
+    sides = [cut_off(triangles, sign * normal, sign * height) for sign in (1.0, -1.0)]
+
+    def area(parts: np.ndarray) -> float:
+        return 0.5 * float(np.linalg.norm(np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0]), axis=1).sum())
+
+    assert area(sides[0]) + area(sides[1]) == pytest.approx(area(triangles))
+    assert (sides[0] @ normal).max(initial=-np.inf) <= height + 1e-9
+    assert (sides[1] @ normal).min(initial=np.inf) >= height - 1e-9
+
+
+def test_a_rounded_hull_contains_all_points_with_few_corners():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(4000, 3))
+    points *= 0.1 / np.linalg.norm(points, axis=1)[:, None]
+    assert len(rounded_hull(points, 1e-5)[0]) == MAX_VERTICES
+    corners, rounding = rounded_hull(points, 0.003)
+    assert len(corners) < MAX_VERTICES and 0.0 < rounding <= 0.003 + 2e-6
+    planes = ConvexHull(corners).equations
+    assert (points @ planes[:, :3].T + planes[:, 3]).max() <= rounding
+    few, none = rounded_hull(points[:40], 0.001)
+    assert len(few) == 40 and none == 0.0
+
+
+def test_a_body_with_hulls_stays_within_its_capsules_at_any_base():
+    base = Pose.from_position_quaternion([0.3, -0.2, 0.5], [0.5, 0.5, 0.5, 0.5])
+    arm = Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8", world_from_base=base)
+    body, plain = body_from_urdf(panda_urdf(), arm), panda_with_hulls()
+    assert body.names == plain.names and body.pairs == plain.pairs
+    for row, hull in zip(body.rows, body.hulls, strict=True):
+        assert np.isfinite(hull.corners).all() and row[7] > 0.0
+    g, h = (robot_arrays((a,), (b,), pack(()), pairs=b.pairs) for a, b in ((arm, body), (panda(), plain)))
+    for q in np.random.default_rng(0).uniform(arm.lower, arm.upper, (50, 7)):
+        assert slack_at(g, q, 0.0, 1.0) == pytest.approx(slack_at(h, q, 0.0, 1.0), abs=1e-5)
