@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .escape.repet import EscapeTree as EscapeTree
     from .escape.repet import RepetSettings as RepetSettings
     from .escape.repet import escape_path as escape_path
+    from .fitting.body_readers import body_from_mujoco as body_from_mujoco
+    from .fitting.body_readers import body_from_urdf as body_from_urdf
     from .geometry.pose import Pose as Pose
     from .geometry.pose import PosePath as PosePath
     from .geometry.shapes import (
@@ -68,8 +70,6 @@ if TYPE_CHECKING:
     from .reactive.reactive_planner import ReactivePlanner as ReactivePlanner
     from .robot.arm import Arm as Arm
     from .robot.body import Body as Body
-    from .robot.body_readers import body_from_mujoco as body_from_mujoco
-    from .robot.body_readers import body_from_urdf as body_from_urdf
     from .safety.safety_layer import SafetyLayer as SafetyLayer
     from .safety.safety_layer import SafetySettings as SafetySettings
 
@@ -190,7 +190,7 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
             ".reactive.reactive_planner": ("ReactivePlanner",),
             ".robot.arm": ("Arm",),
             ".robot.body": ("Body",),
-            ".robot.body_readers": (
+            ".fitting.body_readers": (
                 "body_from_mujoco",
                 "body_from_urdf",
             ),

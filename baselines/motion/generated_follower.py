@@ -27,6 +27,7 @@ from ...planner import (
     guide_index,
 )
 from ...planner.control.arm_arrays import PURSUIT_STATE
+from ...planner.planning.plan import check_success
 from ...planner.reactive.motion_state import MotionState
 from .path_generators import GeneratedPath, PathGenerator
 from .tool_obstacles import ToolObstacles
@@ -70,8 +71,9 @@ class GeneratedFollower(ReactivePlanner):
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """See `Follower`: as planned, with the path generated anew from the present pose of the arm."""
+        check_success(plan, "follow")
         super().go(plan.path, exact=exact)
-        self._task, self._generated = _Generation(plan.request.demonstrated, plan.request.goal, plan.guide), None
+        self._task, self._generated = _Generation(plan.request.demonstrated, plan.goal_pose, plan.guide), None
 
     def stop(self) -> None:
         """See `ReactivePlanner`."""

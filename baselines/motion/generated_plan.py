@@ -15,7 +15,7 @@ from ...planner import Arm, Body, Plan, PlanRequest, PlanSettings, PosePath, gui
 from ...planner.control.arm_arrays import arm_arrays
 from ...planner.control.pursuit import ARRIVED, fresh_pursuit_state
 from ...planner.geometry.pose import METERS_PER_RADIAN
-from ...planner.planning.plan import MotionPlanner
+from ...planner.planning.plan import MotionPlanner, pose_goal
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from ...planner.safety.guarded_pursuit import guarded_roll_out
 from .motion_method import NO_PATH, PATH
@@ -60,7 +60,7 @@ class GeneratedPlanner(MotionPlanner):
     def _made(
         self, request: PlanRequest, scene: PlanningScene, near: ToolObstacles, q: np.ndarray, fraction: float
     ) -> Plan:
-        goal, leaving = request.goal, request.leaving
+        goal, leaving = pose_goal(request), request.leaving
         here = self.arm.fk(q) if leaving is None else leaving[-1]
         imitated = imitated_path(request.demonstrated, goal)
         guide = guide_index(imitated, fraction)

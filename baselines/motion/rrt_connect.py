@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...planner.collision.clearance import slack_at
-from ...planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
+from ...planner.planning.joint_space_rrt import joint_edge_is_clear, sample_ranges, shortcut
 from ...planner.ranges import check_ranges
 from ..extras import needed
 
@@ -67,7 +67,7 @@ def joint_path(
         low: (n,) lower joint limits [rad].
         high: (n,) upper joint limits [rad].
         start: (n,) joints [rad].
-        goals: (n,) joints each [rad], clear.
+        goals: (n,) joints each [rad]; those that are not clear, or beyond a limit, are left out.
         settings: see `RrtSettings`.
         seed: of OMPL's random numbers.
 
@@ -77,17 +77,33 @@ def joint_path(
     Raises:
         MissingExtra: OMPL is not installed.
     """
-    for goal in goals:
+    fit = [goal for goal in goals if _is_fit(g, low, high, goal)]
+    if not fit or not _is_fit(g, low, high, start):
+        return None  # OMPL would wait for a goal without end
+    for goal in fit:
         if joint_edge_is_clear(g, start, goal):
             return np.array([start, goal])
-    search = _Search(g, low, high, settings)
-    points = search.solved(start, goals, seed)
+    search = _Search(g, *_bounds(low, high, start, fit), settings)
+    points = search.solved(start, fit, seed)
     if points is None:
         return None
     out = np.empty((len(points) + settings.shortcuts + 1, len(start)))  # a line may add a point
     out[: len(points)] = points
     state, ends = np.array([float(seed % 2147483646) + 1.0]), np.empty((2, len(start)))
     return out[: shortcut(g, out, len(points), settings.shortcuts, state, ends)].copy()
+
+
+def _is_fit(g: np.ndarray, low: np.ndarray, high: np.ndarray, q: np.ndarray) -> bool:
+    return bool((q >= low).all() and (q <= high).all()) and slack_at(g, q, 0.0, 0.1) >= 0.0
+
+
+def _bounds(
+    low: np.ndarray, high: np.ndarray, start: np.ndarray, goals: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bounds (n,) of the search, which both its ends lie within."""
+    low, high = sample_ranges(low, high, start)
+    ends = np.array([start, *goals])
+    return np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
 
 
 def timed(points: np.ndarray, step: np.ndarray) -> np.ndarray:
@@ -159,7 +175,7 @@ class _Search:
         self._og: Any = needed("ompl.geometric", "ompl")
         self._util: Any = needed("ompl.util", "ompl")
         self._settings, self._dof, self._asked = settings, len(low), [0]
-        self._space = joint_space(np.maximum(low, -np.pi), np.minimum(high, np.pi))
+        self._space = joint_space(low, high)
         self._information = informed(self._space, g)
         self._information.setMotionValidator(_edges(self._ob, self._information, g, self._dof, self._asked))
         self._information.setup()

@@ -23,6 +23,7 @@ from ...planner import (
 )
 from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
+from ...planner.planning.joint_space_rrt import sample_ranges
 from ..extras import needed
 from .motion_method import NO_PATH, SCREW, Follower, MotionMethod, MotionPlanner, Relative
 from .rrt_connect import RrtSettings, joint_path, timed
@@ -116,7 +117,7 @@ class RrtMotion:
         low, high = (np.concatenate([getattr(arm, name) for arm in arms]) for name in ("lower", "upper"))
         for arm, now, end, postures in zip(arms, q, ends, found, strict=True):
             for k in range(sampling.seeds):
-                guess = now if k == 0 else rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi))
+                guess = now if k == 0 else rng.uniform(*sample_ranges(arm.lower, arm.upper, now))
                 solution = inverse_kinematics(arm, end, guess, iterations=150)
                 if solution is not None and arm.margin(solution) >= sampling.margin:
                     postures.append(solution)

@@ -11,7 +11,8 @@ import numpy as np
 from ...planner import Arm, Body, Obstacle, Plan, PlanRequest, PlanSettings, Pose, PosePath, imitated_path
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.imitation.tsia import screw_path
-from ...planner.planning.plan import MotionPlanner
+from ...planner.planning.joint_space_rrt import sample_ranges
+from ...planner.planning.plan import MotionPlanner, pose_goal
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from .motion_method import JOINTS, NO_PATH
 from .rrt_connect import RrtSettings, joint_path, timed
@@ -48,15 +49,14 @@ class RrtPlanner(MotionPlanner):
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, sampling: RrtSettings):
         self.arm, self.body, self.settings, self.sampling = arm, body, settings, sampling
         self._template = SceneTemplate(arm, body, settings.safety, settings.motion.dt)
-        self._low = np.maximum(arm.lower, -np.pi) + sampling.margin
-        self._high = np.minimum(arm.upper, np.pi) - sampling.margin
+        self._low, self._high = arm.lower + sampling.margin, arm.upper - sampling.margin
 
     def answer(self, request: PlanRequest) -> Plan:
         """Plan a motion; of the demonstrated path only the end matters."""
-        begun, q = time.perf_counter(), self.arm.checked(request.start)
+        begun, q, goal = time.perf_counter(), self.arm.checked(request.start), pose_goal(request)
         request = request._replace(start=q.copy())
         joints, reason = q[None], ""
-        for end in [request.goal] if request.leaving is None else [request.leaving[-1], request.goal]:
+        for end in [goal] if request.leaving is None else [request.leaving[-1], goal]:
             found = self.joints_or_reason(joints[-1], end, request.obstacles, request.allowed, request.seed)
             if isinstance(found, str):
                 joints, reason = q[None], found
@@ -69,7 +69,7 @@ class RrtPlanner(MotionPlanner):
             dt=self.settings.motion.dt,
             reason=reason,
             how=JOINTS,
-            imitated_poses=imitated_path(request.demonstrated, request.goal).dqs,
+            imitated_poses=imitated_path(request.demonstrated, goal).dqs,
             path_poses=path.dqs,
             tree_rows=np.empty((0, 8)),
             detours=0,
@@ -123,10 +123,11 @@ class RrtPlanner(MotionPlanner):
     def _postures(self, q: np.ndarray, goal: Pose, scene: PlanningScene, strict: PlanningScene) -> list[Posture]:
         """Return clear postures of the goal, nearest first; preferably those with contacts on a straight end only."""
         rng, found, seeds = np.random.default_rng(0), [], self.sampling.seeds
+        low, high = sample_ranges(self._low, self._high, q)
         for k in range(seeds * 2**MORE):
             if found and k >= seeds:
                 break
-            guess = q if k == 0 else rng.uniform(self._low, self._high)
+            guess = q if k == 0 else rng.uniform(low, high)
             solution = inverse_kinematics(self.arm, goal, guess, iterations=150)
             if solution is not None and self._is_clear(solution, scene):
                 found.append(solution)

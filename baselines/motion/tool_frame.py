@@ -31,7 +31,7 @@ def seen_from(plan: Plan, arm: Arm, tcp_from_other: Pose) -> Plan:
     asked = plan.request
     request = asked._replace(
         demonstrated=asked.demonstrated.with_tool(tcp_from_other),
-        goal=asked.goal @ tcp_from_other,
+        goal=_goal(asked, tcp_from_other),
         leaving=None if asked.leaving is None else asked.leaving.with_tool(tcp_from_other),
         next_motion=_next_motion(asked.next_motion, tcp_from_other),
     )
@@ -39,6 +39,11 @@ def seen_from(plan: Plan, arm: Arm, tcp_from_other: Pose) -> Plan:
     return plan._replace(
         imitated_poses=imitated, path_poses=path, tree_rows=plan.tree_rows[:0], request=request, arm=arm
     )
+
+
+def _goal(request: PlanRequest, tcp_from_other: Pose) -> Pose | ArrayLike:
+    """Return the same goal for another tcp; joints are the same."""
+    return request.goal @ tcp_from_other if isinstance(request.goal, Pose) else request.goal
 
 
 class ToolFramePlanner(MotionPlanner):
@@ -59,7 +64,7 @@ class ToolFramePlanner(MotionPlanner):
         tool, leaving = self._tool, request.leaving
         there = request._replace(
             demonstrated=request.demonstrated.with_tool(tool),
-            goal=request.goal @ tool,
+            goal=_goal(request, tool),
             leaving=None if leaving is None else leaving.with_tool(tool),
             next_motion=_next_motion(request.next_motion, tool),
         )

@@ -14,7 +14,7 @@ from ...planner.collision.edge_certificates import pose_tool, tool_arrays
 from ...planner.collision.robot_arrays import HEADER, NEAR_PAIR, ROW
 from ...planner.geometry.shapes import pack
 from ...planner.robot.body import BODY
-from ...planner.safety.safety_layer import contact_masks
+from ...planner.safety.robot_checks import contact_masks
 
 KNOWN_REACH = 0.01
 """Distance [m] at which an obstacle that belongs to the task (one with its own margin) begins to push."""

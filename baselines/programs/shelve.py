@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...envs import TaskDescription
-from ...envs.scene.robots import robot_named
+from ...envs import ROBOTS, TaskDescription
 from ...planner import Demonstration, Pose, PosePath, imitated_path
 from ...planner.errors import PlanFailed
 from ...planner.geometry.pose import nearest
@@ -221,9 +220,12 @@ def _named_obstacles(names: Sequence[str]) -> tuple[tuple[str, str], ...]:
 
 
 def _gripper_after(shown: Demonstration, name: str, task: TaskDescription) -> float:
-    """Return the action that opens this gripper as far as the demonstrated one at the end of a motion."""
+    """Return the action that opens this gripper as far as the demonstrated one at the end of a motion.
+
+    How wide an unknown robot's gripper opens is unknown: then the action itself is the demonstrated one.
+    """
     assert shown.gripper is not None
     action = float(shown.gripper[shown.segment(name).stop + 1])
-    if shown.robot == task.robot or action >= 0.0:
+    if shown.robot == task.robot or shown.robot not in ROBOTS or action >= 0.0:
         return action
-    return max(action * robot_named(shown.robot).opening / task.gripper_width[0], OPEN)
+    return max(action * ROBOTS[shown.robot].opening / task.gripper_width[0], OPEN)

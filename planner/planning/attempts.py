@@ -18,12 +18,14 @@ class Attempt(NamedTuple):
         bias: of the detours, see `RepetSettings.bias`.
         factor: of the planning margin.
         early: detours rejoin the path at the first possible pose.
+        detours: False: the path is followed without.
     """
 
     guide: float
     bias: Corner
     factor: float = 1.0
     early: bool = False
+    detours: bool = True
 
 
 def attempts(settings: PlanSettings, escapes: list[int]) -> Iterator[Attempt]:

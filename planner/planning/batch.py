@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from ..ranges import check_range
+from ..arrays import checked_items
+from ..ranges import check_count
 from ..robot.arm import Arm
 from ..robot.body import Body
 from .plan import Plan, PlanRequest
@@ -30,10 +31,11 @@ def plan_batch(
         The plans, in the order of the requests.
 
     Raises:
+        WrongType: an item of the requests is none.
         BadOption: `workers` is not from 1 to 256.
     """
-    check_range("workers", workers, "[1, 256]")
-
+    check_count("workers", workers, "[1, 256]")
+    requests = checked_items("requests", requests, PlanRequest)
     left = iter(enumerate(requests))  # taking the next request is one step of the interpreter
 
     def run(planner: Planner) -> dict[int, Plan]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.pursuit import restart_pursuit
-from ..escape.detour import ESCAPED, escape, last_tree, write_edge
+from ..escape.detour import ESCAPED, TOO_LONG, escape, last_tree, write_edge
 from ..escape.repet import RepetSettings
 from ..escape.tree_arrays import DETOUR_LOG, tree_arrays
 from ..geometry import screw
@@ -35,7 +35,7 @@ COUNT = CountColumns()
 
 
 class Buffers(NamedTuple):
-    """Work arrays of `plan_closed_loop`; allocated once, used again."""
+    """Work arrays of `plan_closed_loop`; allocated once, used again until a call needs more room."""
 
     imitated: np.ndarray
     path: np.ndarray
@@ -55,21 +55,23 @@ class Buffers(NamedTuple):
     counts: np.ndarray
 
 
-def buffers(settings: RepetSettings, dof: int, ticks: int) -> Buffers:
+def buffers(settings: RepetSettings, dof: int, ticks: int, given: int = 0) -> Buffers:
     """Allocate the work arrays.
 
     Args:
-        settings: of the escape trees, whose sizes they set.
+        settings: of the escape trees, whose sizes they set; there is room for `longest` poses of blend and detours.
         dof: number of joints.
         ticks: maximum number of ticks of a motion.
+        given: maximum number of poses of the demonstrated path and of that by which the start is left, together.
     """
+    poses = given + settings.longest
     tree, cells, heap = tree_arrays(settings.nodes, settings.levels)
     return Buffers(
-        imitated=np.zeros((settings.longest, 8)),
-        path=np.zeros((settings.longest, 8)),
-        followed=np.zeros((settings.longest, 8)),
-        spare=np.zeros((settings.longest, 8)),
-        slacks=np.zeros(settings.longest),
+        imitated=np.zeros((poses, 8)),
+        path=np.zeros((poses, 8)),
+        followed=np.zeros((poses, 8)),
+        spare=np.zeros((poses, 8)),
+        slacks=np.zeros(poses),
         places=np.zeros(settings.candidates),
         poses=np.zeros((settings.candidates, 8)),
         branch=np.zeros((settings.levels + 3, 8)),
@@ -145,17 +147,21 @@ def plan_closed_loop(work, g, tool, demo, goal, lead, q, fraction, spacing, dt, 
         out: (dof,) scratch.
 
     Returns:
-        (status of the escape, status of the pursuit, smallest joint margin [rad]).
+        (status of the escape, status of the pursuit, smallest joint margin [rad]). The status of the escape is
+        TOO_LONG, too, where the paths or the blend between them do not fit into the work arrays.
     """
     n, counts = len(demo), b.counts
+    counts[:] = 0
+    if len(lead) + n > min(len(b.imitated), len(b.path), len(b.followed)):
+        return TOO_LONG, 0, -math.inf
     _imitated(demo, (goal[0], goal[1], goal[2], goal[3], goal[4], goal[5], goal[6], goal[7]), b.imitated)
     guide = _guide(b.imitated, n, fraction) if n > 1 else 0
     at = _copied(lead, 0, len(lead), b.path, 0)
     at = write_edge(b.path, at, screw.load8(lead, len(lead) - 1), screw.load8(b.imitated, guide), spacing)
-    full = _copied(b.imitated, guide + 1, n, b.path, at) if at > 0 else 0
-    counts[COUNT.imitated], counts[COUNT.guide], counts[COUNT.last], counts[COUNT.changed] = n, guide, 0, 0
-    if full == 0:
-        return -1, 0, -math.inf
+    counts[COUNT.imitated], counts[COUNT.guide] = n, guide
+    if at < 0 or at + n - guide - 1 > len(b.path):
+        return TOO_LONG, 0, -math.inf
+    full = _copied(b.imitated, guide + 1, n, b.path, at)
     b.log[:] = 0.0
     status, full, counts[COUNT.detours] = escape(
         tool, b.path, full, b.spare, b.slacks, b.places, b.poses, b.branch, b.tree, b.cells, b.heap, b.options,

@@ -12,9 +12,10 @@ from ..control.inverse_kinematics import inverse_kinematics
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..geometry.pose import Pose, PosePath
 from ..imitation.tsia import guide_index, imitated_path
+from ..ranges import ticks_of
 from ..robot.arm import Arm
 from ..safety.guarded_pursuit import guarded_roll_out
-from .joint_space_rrt import connect, shortcut
+from .joint_space_rrt import connect, sample_ranges, shortcut
 from .planning_scene import PlanningScene
 
 if TYPE_CHECKING:
@@ -34,6 +35,11 @@ RAMP = 0.3
 """Seconds from rest to full speed."""
 
 
+IK_OR_LIMIT, NO_CLEAR_POSTURE, NO_JOINT_PATH = "ik_or_limit", "no clear posture", "no path in joint space"
+"""Reasons of a failed search: no posture, or none from which the rest of the path can be followed; every posture is in
+collision; no path leads to a posture."""
+
+
 class JointSpaceMotion(NamedTuple):
     """The result of a search.
 
@@ -50,6 +56,18 @@ class JointSpaceMotion(NamedTuple):
     guide: int
     margin: float
     next_feasible: bool
+
+
+class SearchFailure(NamedTuple):
+    """A search without success.
+
+    Attributes:
+        reason: IK_OR_LIMIT, NO_CLEAR_POSTURE or NO_JOINT_PATH.
+        detail: the facts of this case; "" if there is no more to say.
+    """
+
+    reason: str
+    detail: str
 
 
 class NextMotionCheck(NamedTuple):
@@ -119,8 +137,8 @@ def plan_joint_space(
     settings: PlanSettings,
     check: NextMotionCheck | None,
     seed: int,
-) -> JointSpaceMotion | None:
-    """Search a path in joint space to the goal, imitating the end of the demonstration; None without success.
+) -> JointSpaceMotion | SearchFailure:
+    """Search a path in joint space to the goal, imitating the end of the demonstration.
 
     Args:
         arm: the arm.
@@ -132,25 +150,31 @@ def plan_joint_space(
         settings: see `PlanSettings`.
         check: check of the next motion; None: there is none.
         seed: of all random choices.
+
+    Returns:
+        The motion, or why the last round found none.
     """
     search = settings.search
     assert search is not None
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(abs(seed))
     state = np.array([float(seed % 2147483646) + 1.0])
     trees, parents = np.empty((2, search.nodes, arm.dof)), np.empty((2, search.nodes))
     out = np.empty((2 * search.nodes, arm.dof))
-    ends = np.empty((2, arm.dof))
+    ends, failure = np.empty((2, arm.dof)), SearchFailure(IK_OR_LIMIT, "")
     for turn in range(search.rounds):
         later = search.rounds - 1 - turn
         iterations = max(search.iterations // ROUND_SHRINK**later, min(MIN_ITERATIONS, search.iterations))
-        found = _postures(arm, scene, work, demonstrated, goal, q, settings, check, rng, search.seeds * 2**turn)
+        found, failure = _postures(
+            arm, scene, work, demonstrated, goal, q, settings, check, rng, search.seeds * 2**turn
+        )
         best, least = None, math.inf
         for posture in sorted(found)[: search.postures]:
             if posture.cost >= least:
                 break  # no path is shorter than the straight line
-            count = connect(scene.seen, q, posture.q, trees, parents, search.step, iterations, state, out)
+            seen = scene.with_contacts_as_at(q, posture.q)
+            count = connect(seen, q, posture.q, trees, parents, search.step, iterations, state, out)
             if count:
-                count = shortcut(scene.seen, out, count, search.shortcuts, state, ends)
+                count = shortcut(seen, out, count, search.shortcuts, state, ends)
                 cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
                 if cost < least:
                     best, least = (out[:count].copy(), posture), cost
@@ -160,7 +184,7 @@ def plan_joint_space(
             joints = np.vstack([timed_joints[:-1], posture.tail])
             margin = min(arm.margin(row) for row in joints)
             return JointSpaceMotion(joints, posture.path, posture.guide, margin, posture.next_feasible)
-    return None
+    return failure
 
 
 def _length(points: np.ndarray) -> float:
@@ -168,23 +192,31 @@ def _length(points: np.ndarray) -> float:
     return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
 
 
-def _postures(arm, scene, work, demonstrated, goal, q, settings, check, rng, seeds) -> list[_Posture]:
-    """Clear postures on the imitated path from which the rest of it can be followed, with their costs."""
-    search, found = settings.search, []
+def _postures(
+    arm, scene, work, demonstrated, goal, q, settings, check, rng, seeds
+) -> tuple[list[_Posture], SearchFailure]:
+    """Return clear postures on the imitated path from which the rest of it can be followed, with their costs.
+
+    And the failure that it would be if no path led to any of them.
+    """
+    search, found, collision, clear = settings.search, [], None, 0
     imitated = imitated_path(demonstrated, goal)
     first, last = guide_index(imitated, settings.motion.guide), len(imitated) - 1
-    home = np.clip(q, np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi))
+    home, (low, high) = np.clip(q, arm.lower, arm.upper), sample_ranges(arm.lower, arm.upper, q)
     for index in sorted({round(i) for i in np.linspace(first, last, search.targets)}):
         path = imitated[index:]
         near = inverse_kinematics(arm, path[0], home, iterations=150)
         for k in range(seeds):
-            low, high = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
             guess = home if k == 0 and seeds == search.seeds else rng.uniform(low, high)
             if k % 2 and near is not None:  # around the nearest posture the same elbow is found turned
                 guess = np.clip(near + rng.normal(0.0, SEED_SPREAD, arm.dof), low, high)
             solution = inverse_kinematics(arm, path[0], guess, iterations=150)
-            if solution is None or scene.slack(solution) < 0.0:
+            if solution is None:
                 continue
+            if scene.slack(solution) < 0.0:
+                collision = solution if collision is None else collision
+                continue
+            clear += 1
             tail, margin = _followed(scene, work, path, solution, settings)
             if tail is None:
                 continue
@@ -195,13 +227,24 @@ def _postures(arm, scene, work, demonstrated, goal, q, settings, check, rng, see
                 assert check is not None
                 cost += INFEASIBLE_COST if check.required else 5.0
             found.append(_Posture(cost, len(found), solution, tail, path, index, next_feasible))
-    return found
+    return found, _failure(scene, len(found), clear, collision)
+
+
+def _failure(scene: PlanningScene, found: int, clear: int, collision: np.ndarray | None) -> SearchFailure:
+    """Return why no path leads to a goal that `found` postures were found for, of `clear` that are in no collision."""
+    if found:
+        return SearchFailure(NO_JOINT_PATH, f"none leads to any of {found} postures")
+    if clear:
+        return SearchFailure(IK_OR_LIMIT, f"the rest of the path cannot be followed from any of {clear} postures")
+    if collision is not None:
+        return SearchFailure(NO_CLEAR_POSTURE, f"in the first of those found {scene.tightest(collision)}")
+    return SearchFailure(IK_OR_LIMIT, "")
 
 
 def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]:
     """Joints of following a path from q among the obstacles, or None; and the smallest joint margin."""
     dof, dt = len(q), settings.motion.dt
-    trace, pursuit_state = np.empty((round(settings.max_seconds / dt) + 1, dof)), fresh_pursuit_state()
+    trace, pursuit_state = np.empty((ticks_of(settings.max_seconds, dt) + 1, dof)), fresh_pursuit_state()
     status, last, margin, _ = guarded_roll_out(
         work, scene.robot, path.dqs, q.copy(), dt, pursuit_state, np.empty(dof), np.empty(dof), trace, 0
     )

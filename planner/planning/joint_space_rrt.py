@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..collision.capsule_placement import may_touch, place_capsules
-from ..collision.clearance import all_beyond, capsule_distance, obstacle_distance, slack_at
+from ..collision.clearance import all_beyond, capsule_distance, hull_distance, obstacle_distance, slack_at
+from ..collision.hull_distance import asks_hull, asks_hulls, pair_hull_distance
 from ..collision.robot_arrays import CAPSULE, HEADER, MAX_JOINTS, PAIR, PLACED, ROW, SETTING
 from ..collision.step_certificates import bound_motion
 from ..escape.tangent_plane import random_number
@@ -24,7 +27,7 @@ def _clear_stretch(g):
     """Fraction of a step, up to 1, that is proven clear from ROW.placed on; -1 if the robot is too close already."""
     stretch, longest = 1.0, 0.0
     for c in range(int(g[ROW.header, HEADER.capsules])):
-        longest = max(longest, g[ROW.placed + c, PLACED.reach])
+        longest = max(longest, g[ROW.placed + c, PLACED.reach] + g[ROW.placed + c, PLACED.swing])
     for k in range(int(g[ROW.header, HEADER.obstacles])):
         margin = g[ROW.obstacles + k, OBSTACLE.margin]
         if all_beyond(g, ROW.placed, k, 0.0, margin + stretch * longest):
@@ -33,20 +36,41 @@ def _clear_stretch(g):
             if g[ROW.body + c, CAPSULE.frame] >= 0.0 and not may_touch(g, k, c):
                 displacement = g[ROW.placed + c, PLACED.reach]
                 slack = obstacle_distance(g, ROW.placed, c, k, 0.0, margin + stretch * displacement) - margin
-                if slack < 0.0:
+                if slack >= stretch * displacement:
+                    continue
+                part = _share(slack, displacement)
+                if asks_hull(g, c, slack):
+                    displacement += g[ROW.placed + c, PLACED.swing]
+                    slack = hull_distance(g, ROW.placed, c, k, 0.0, margin + stretch * displacement) - margin
+                    part = max(part, _share(slack, displacement))
+                if part < 0.0:
                     return -1.0
-                if slack < stretch * displacement:
-                    stretch = slack / displacement
+                stretch = min(stretch, part)
     first = int(g[ROW.header, HEADER.first_pair])
     for p in range(first, first + int(g[ROW.header, HEADER.pairs])):
         i, j = int(g[p, PAIR.first]), int(g[p, PAIR.second])
         displacement = g[ROW.placed + i, PLACED.reach] + g[ROW.placed + j, PLACED.reach]
         slack = capsule_distance(g, ROW.placed, i, j) - g[ROW.settings, SETTING.self_margin]
-        if slack < 0.0:
+        if slack >= stretch * displacement:
+            continue
+        part = _share(slack, displacement)
+        if asks_hulls(g, i, j, slack):
+            margin = g[ROW.settings, SETTING.self_margin]
+            displacement += g[ROW.placed + i, PLACED.swing] + g[ROW.placed + j, PLACED.swing]
+            slack = pair_hull_distance(g, ROW.placed, i, j, margin + stretch * displacement)[0] - margin
+            part = max(part, _share(slack, displacement))
+        if part < 0.0:
             return -1.0
-        if slack < stretch * displacement:
-            stretch = slack / displacement
+        stretch = min(stretch, part)
     return stretch
+
+
+@inlined
+def _share(slack, displacement):
+    """Share of a displacement that a slack covers; negative without slack."""
+    if slack < 0.0:
+        return -1.0
+    return slack / displacement if displacement > 0.0 else 1.0
 
 
 @kernel
@@ -144,6 +168,31 @@ def _changed(counts, k, value):
     return (value, counts[1]) if k == 0 else (counts[0], value)
 
 
+@inlined
+def sample_range(lower, upper, around):
+    """Ends of the range in which a joint is sampled: its limits, or one turn within them where they are wider.
+
+    Args:
+        lower: limit [rad or m].
+        upper: limit.
+        around: joint about which a range of one turn lies.
+    """
+    low = min(max(around - math.pi, lower), max(lower, upper - 2.0 * math.pi))
+    return low, min(upper, low + 2.0 * math.pi)
+
+
+def sample_ranges(lower: np.ndarray, upper: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the ranges in which joints are sampled: all their limits allow, but no turn twice.
+
+    Args:
+        lower: (n,) lower joint limits [rad or m].
+        upper: (n,) upper joint limits.
+        around: (n,) joints about which a range of one turn lies.
+    """
+    low, high = np.transpose([sample_range(*each) for each in zip(lower, upper, around, strict=True)])
+    return low, high
+
+
 @kernel
 def connect(g, start, goal, trees, parents, step, iterations, state, out):
     """A clear path in joint space from start to goal, the number of its points; 0 if none was found.
@@ -168,7 +217,8 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
     for k in range(iterations):
         a, b = (0, 1) if k % 2 == 0 else (1, 0)
         for i in range(n):
-            low, high = max(g[ROW.lower, i], -math.pi), min(g[ROW.upper, i], math.pi)
+            low, high = sample_range(g[ROW.lower, i], g[ROW.upper, i], 0.5 * (start[i] + goal[i]))
+            low, high = min(low, start[i], goal[i]), max(high, start[i], goal[i])
             sample[i] = low + random_number(state) * (high - low)
         if k < 2:
             for i in range(n):

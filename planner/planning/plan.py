@@ -1,18 +1,23 @@
 """Requests and plans: what a planner is asked, and what it answers.
 
-A failed plan has a `reason`, the kind of failure, and a `detail`, the facts of this case for the reader:
+A failed plan has a `reason`, the kind of failure, and a `detail`, the facts of this case for the reader. Where a
+search in joint space was the last to fail, the reason is the search's.
 
 | reason | meaning | detail |
 |---|---|---|
 | start beyond a joint limit | a joint of the start lies outside its limits | the joint |
 | start in collision | at the start the arm is closer to something than its margin | part, obstacle, distance |
-| goal in collision | at the goal the tool is closer to something than its margin | part, obstacle, distance |
+| goal beyond a joint limit | a joint of a goal given as joints lies outside its limits | the joint |
+| goal in collision | as at the start, for the tool at a pose, for the arm at joints | part, obstacle, distance |
 | no room for a detour at the start | the start is clear, but too close for detours | part, obstacle, distance |
 | no room for a detour at the goal | the goal is clear, but too close for detours | part, obstacle, distance |
 | no escape found | no escape tree saw the path again | number of nodes |
 | node limit reached | an escape tree stopped at `RepetSettings.nodes`: more nodes may help | the limit |
-| the detours do not fit into the longest path allowed | see `RepetSettings.longest` | |
-| ik_or_limit | the arm does not follow any path of the tool to its end | |
+| the detours do not fit into the longest path allowed | see `RepetSettings.longest` | the limit |
+| ik_or_limit | the arm does not follow any path of the tool to its end | how far it reaches, or comes |
+| no clear posture | all postures that a search in joint space found are in collision | part, obstacle, distance |
+| no path in joint space | a search in joint space found postures, but no path | number of postures |
+| no path to the goal joints | neither the tool's path nor a search in joint space leads there | number of searches |
 """
 
 from __future__ import annotations
@@ -24,7 +29,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import BadOption
+from ..arrays import checked_items, checked_kind
+from ..errors import BadOption, PlanFailed, WrongType
 from ..escape.detour import GOAL_IN_COLLISION, START_IN_COLLISION
 from ..escape.repet import REASONS, EscapeTree
 from ..geometry.pose import Pose, PosePath
@@ -33,6 +39,7 @@ from ..imitation.demonstration import Demonstration
 from ..log.motion_log import MotionLog
 from ..robot.arm import Arm
 from ..robot.body import Body
+from ..safety.robot_checks import checked_contacts
 from .settings import PlanSettings
 
 WHY = {
@@ -62,11 +69,13 @@ class PlanRequest(NamedTuple):
     """A motion to plan.
 
     Attributes:
-        demonstrated: the path of the tcp to imitate, any number of poses.
+        demonstrated: the path of the tcp to imitate, any number of poses; of very long paths poses at even steps of
+            their length are taken, see `Plan.reduction`.
         start: (dof,) joints now.
-        goal: pose of the tcp at the end.
+        goal: pose of the tcp at the end, or (dof,) joints at the end.
         obstacles: as they are now; they are taken to stand still.
-        allowed: pairs of names (part of the body or held object, obstacle) that may touch.
+        allowed: pairs of names (part of the body or held object, obstacle) that may touch along the imitated path; a
+            search in joint space, or a detour, goes no deeper than the motion's ends.
         leaving: path of the tcp from its pose at `start` on, by which the start is left; None: blend at once.
         next_motion: the motion that follows, if it is known.
         seed: of all random choices; the same seed gives the same plan.
@@ -74,12 +83,23 @@ class PlanRequest(NamedTuple):
 
     demonstrated: PosePath
     start: ArrayLike
-    goal: Pose
+    goal: Pose | ArrayLike
     obstacles: tuple[Obstacle, ...] = ()
     allowed: tuple[tuple[str, str], ...] = ()
     leaving: PosePath | None = None
     next_motion: NextMotion | None = None
     seed: int = 0
+
+
+def pose_goal(request: PlanRequest) -> Pose:
+    """Return the goal of a request to a planner that only takes poses.
+
+    Raises:
+        BadOption: the goal is given as joints.
+    """
+    if not isinstance(request.goal, Pose):
+        raise BadOption("goal", "is given as joints; this planner takes a Pose of the tcp")
+    return request.goal
 
 
 class Plan(NamedTuple):
@@ -108,6 +128,8 @@ class Plan(NamedTuple):
             above 1 where the plan joins the path earlier.
         refined: refinements made since: "smooth", "timed".
         next_feasible: False if a required next motion cannot be followed from the end of the plan.
+        reduction: largest weighted distance [m] of the demonstrated path from the poses of it that were planned with,
+            see `planner.imitation.reduction`; 0: all of them were, see `RepetSettings.longest`.
     """
 
     joints: np.ndarray
@@ -131,6 +153,7 @@ class Plan(NamedTuple):
     imitated_share: float = 1.0
     refined: tuple[str, ...] = ()
     next_feasible: bool = True
+    reduction: float = 0.0
 
     @property
     def success(self) -> bool:
@@ -146,6 +169,12 @@ class Plan(NamedTuple):
     def end_margin(self) -> float:
         """Joint margin [rad] at the end."""
         return self.arm.margin(self.joints[-1])
+
+    @property
+    def goal_pose(self) -> Pose:
+        """Pose of the tcp at the goal."""
+        goal = self.request.goal
+        return goal if isinstance(goal, Pose) else self.arm.fk(goal)
 
     @property
     def imitated(self) -> PosePath:
@@ -164,7 +193,9 @@ class Plan(NamedTuple):
 
     def log(self) -> MotionLog:
         """Return the motion and its world as `certify` takes them; a failed plan claims nothing."""
-        request = self.request
+        request, claims = self.request, {"joint_margin": self.margin}
+        if not isinstance(request.goal, Pose):  # joints are met, not neared
+            claims |= {"position_error": 0.0, "angle_error": 0.0}
         return MotionLog(
             arm=self.arm,
             body=self.body,
@@ -172,11 +203,26 @@ class Plan(NamedTuple):
             time=self.dt * np.arange(len(self.joints)),
             joints=self.joints,
             safety=self.settings.safety.distance,
-            goal=request.goal,
+            goal=self.goal_pose,
             demonstrated=self.imitated if self.success else None,
             allowed=request.allowed,
-            claims={"joint_margin": self.margin} if self.success else {},
+            claims=claims if self.success else {},
         )
+
+
+def check_success(plan: Plan, what: str) -> None:
+    """Refuse a plan that failed.
+
+    Args:
+        plan: the plan.
+        what: the use it is for, for the message: "follow".
+
+    Raises:
+        WrongType: no plan.
+        PlanFailed: "plan_failed", the plan failed.
+    """
+    if not checked_kind("plan", plan, Plan).success:
+        raise PlanFailed("plan_failed", f"there is no plan to {what}: {plan.why}")
 
 
 class MotionPlanner(ABC):
@@ -200,7 +246,7 @@ class MotionPlanner(ABC):
         self,
         demonstrated: Demonstration | PosePath,
         start: ArrayLike,
-        goal: Pose,
+        goal: Pose | ArrayLike,
         obstacles: Sequence[Obstacle] = (),
         *,
         segment: str | None = None,
@@ -214,7 +260,7 @@ class MotionPlanner(ABC):
         Args:
             demonstrated: a demonstration, or the path of the tcp to imitate.
             start: (dof,) joints now [rad or m].
-            goal: pose of the tcp at the end.
+            goal: pose of the tcp at the end, or (dof,) joints [rad or m] at the end, which are then met exactly.
             obstacles: as they are now; they are taken to stand still.
             segment: name of the demonstration's segment to imitate; not needed if there is only one, or none.
             allowed: pairs of names (part of the body or held object, obstacle) that may touch.
@@ -228,10 +274,12 @@ class MotionPlanner(ABC):
         Raises:
             BadOption: the demonstration has several segments and none is named, or `segment` is given with a path.
             UnknownName: the demonstration has no segment of that name.
-            BadShape, NotFinite: `start` is not (dof,) finite numbers.
+            WrongType, BadShape, NotFinite: an argument is of a wrong class; `start`, or a goal given as joints, is not
+                (dof,) finite numbers.
         """
         path = segment_of(demonstrated, segment)
-        return self.answer(PlanRequest(path, start, goal, tuple(obstacles), tuple(allowed), leaving, next_motion, seed))
+        around, contacts = checked_items("obstacles", obstacles, Obstacle), checked_contacts(allowed)
+        return self.answer(PlanRequest(path, start, goal, around, contacts, leaving, next_motion, seed))
 
 
 def segment_of(demonstrated: Demonstration | PosePath, segment: str | None = None) -> PosePath:
@@ -242,6 +290,7 @@ def segment_of(demonstrated: Demonstration | PosePath, segment: str | None = Non
         segment: name of the demonstration's segment; None: its only one, or the whole path if it has none.
 
     Raises:
+        WrongType: neither a demonstration nor a path.
         BadOption: the demonstration has several segments and none is named, or `segment` is given with a path.
         UnknownName: the demonstration has no segment of that name.
     """
@@ -249,6 +298,8 @@ def segment_of(demonstrated: Demonstration | PosePath, segment: str | None = Non
         if segment is not None:
             raise BadOption("segment", f"{segment!r} is given, but a path has no segments")
         return demonstrated
+    if not isinstance(demonstrated, Demonstration):
+        raise WrongType("demonstrated", demonstrated, "a Demonstration or a PosePath")
     if segment is not None:
         return demonstrated.segment_path(segment)
     names = [each.name for each in demonstrated.segments]

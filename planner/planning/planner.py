@@ -15,30 +15,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import checked_kind
 from ..control.arm_arrays import arm_arrays
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
-from ..escape.detour import ESCAPED, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
+from ..control.reachability import why_not_reached
+from ..escape.detour import ESCAPED, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION, TOO_LONG
 from ..escape.repet import Corner
 from ..escape.tree_arrays import OPTION
-from ..geometry.pose import Pose, PosePath
-from ..imitation.tsia import guide_index, imitated_path
+from ..geometry.pose import Pose
+from ..imitation.tsia import imitated_path, imitated_share
+from ..ranges import ticks_of
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..robot.kinematics import FRAME, forward_into
 from .attempts import Attempt, attempts
 from .closed_loop_motion import COUNT, Buffers, buffers, plan_closed_loop
-from .joint_space_motion import NextMotionCheck, path_deviation, plan_joint_space
+from .joint_goal import line_to, plan_to_joints, tool_path
+from .joint_space_motion import IK_OR_LIMIT, NextMotionCheck, SearchFailure, path_deviation, plan_joint_space
 from .plan import WHY, MotionPlanner, Plan, PlanRequest
-from .planning_scene import PlanningScene, SceneTemplate, checked_obstacles
+from .planning_scene import PlanningScene, SceneTemplate
+from .requests import checked_request, reduced_request, unfit
 from .settings import PlanSettings
 
 
 class _Run(NamedTuple):
-    """One answer in the making: the request, the arm among obstacles, its joints, and the check of the next motion."""
+    """An answer in the making: request, the arm among obstacles, its joints, its goal, the check of the next motion."""
 
     request: PlanRequest
     scene: PlanningScene
     q: np.ndarray
+    goal: Pose
     check: NextMotionCheck | None
 
 
@@ -52,43 +58,68 @@ class Planner(MotionPlanner):
     """
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings | None = None):
-        self.arm, self.settings = arm, settings or PlanSettings()
+        self.arm, self.settings = checked_kind("arm", arm, Arm), settings or PlanSettings()
         self.hold(body)
         motion = self.settings.motion
         self._work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
         self._options: dict[Corner, np.ndarray] = {}
-        self._buffers: Buffers = buffers(self.settings.repet, arm.dof, round(self.settings.max_seconds / motion.dt))
+        self._buffers = self._room(2)
         self._pursuit_state, self._wish, self._out = fresh_pursuit_state(), np.empty(arm.dof), np.empty(arm.dof)
 
     def hold(self, body: Body) -> None:
-        """Use another body from now on: after an object was grasped or released."""
-        self.body = body
+        """Use another body from now on: after an object was grasped or released.
+
+        Raises:
+            WrongType, BadModel: no body, or one of another arm.
+        """
         settings = self.settings
         self._template = SceneTemplate(self.arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
+        self.body = body
 
     def answer(self, request: PlanRequest) -> Plan:
         """Plan a motion; a failed plan says why.
 
         Raises:
-            BadShape, NotFinite: the start is not (dof,) finite numbers.
-            BadOption: there are too many obstacles.
+            WrongType, BadShape, NotFinite, BadOption: a part of the request cannot be used, see `checked_request`.
             UnknownName: `allowed` names a part or an obstacle that does not exist.
         """
         begun = time.perf_counter()
+        asked = checked_request(request, self.arm)
+        request, reduction = reduced_request(asked, max(self.settings.repet.longest, 2))
+        plan = self._answer(request)
+        return plan._replace(request=asked, reduction=reduction, seconds=time.perf_counter() - begun)
+
+    def _answer(self, request: PlanRequest) -> Plan:
+        """Plan a motion along paths that the work arrays have room for."""
         q = self.arm.checked(request.start)
-        request = request._replace(start=q.copy())
-        obstacles = checked_obstacles(request.obstacles)
-        scene = PlanningScene(self._template, obstacles, self.settings.repet.distance, request.allowed)
-        run = _Run(request, scene, q, self._check_of(scene, request))
-        reason, detail = self._unfit(scene, q, request.goal)
+        scene = PlanningScene(self._template, request.obstacles, self.settings.repet.distance, request.allowed)
+        to = request.goal
+        pose = to if isinstance(to, Pose) else self.arm.fk(to)
+        run = _Run(request, scene, q, pose, self._check_of(scene, request))
+        reason, detail = unfit(self.arm, scene, request, self.settings)
         if reason:
             return self._failed(run, reason, detail)
         leaving = request.leaving
         lead = leaving.dqs.copy() if leaving is not None else self._pose(q)[None]
+        self._make_room(len(lead) + len(request.demonstrated))
+        if not isinstance(to, Pose):
+            return self._to_joints(run, np.asarray(to), lead)._replace(tries=1)
         best, tries = self._followed(run, lead, request.seed)
         if not best.success or best.end_margin < self.settings.end_margin or not best.next_feasible:
             best = self._searched(run, best, request.seed)
-        return best._replace(tries=tries, seconds=time.perf_counter() - begun)
+        if best.reason == IK_OR_LIMIT and not best.detail:
+            best = best._replace(detail=why_not_reached(self.arm, pose, q, search=self.settings.search is not None))
+        return best._replace(tries=tries)
+
+    def _make_room(self, given: int) -> None:
+        """Grow the work arrays if a number of given poses needs more."""
+        if given + self.settings.repet.longest > len(self._buffers.path):
+            self._buffers = self._room(given)
+
+    def _room(self, given: int) -> Buffers:
+        """Return work arrays with room for a number of given poses."""
+        settings = self.settings
+        return buffers(settings.repet, self.arm.dof, ticks_of(settings.max_seconds, settings.motion.dt), given)
 
     def _followed(self, run: _Run, lead: np.ndarray, seed: int) -> tuple[Plan, int]:
         """Return the first good plan of the closed loops, else the best of a few, else a failed one; and the tries."""
@@ -100,7 +131,9 @@ class Planner(MotionPlanner):
                 extra -= 1
             status, pursuit, margin = self._closed_loop(run, lead, attempt, seed)
             escapes.append(status)
-            if pursuit == ARRIVED and self._is_straight():
+            trace = self._buffers.trace[: self._buffers.counts[COUNT.last] + 1]
+            kept = status != ESCAPED or run.scene.keeps_contacts(trace)  # a detour is no wanted contact
+            if pursuit == ARRIVED and self._is_straight() and kept:
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
                 found = found._replace(next_feasible=self._next_is_feasible(run, found.joints[-1]))
@@ -108,7 +141,7 @@ class Planner(MotionPlanner):
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
             elif failed is None:
-                reason = WHY.get(status, "") or "ik_or_limit"
+                reason = WHY.get(status, "") or IK_OR_LIMIT
                 failed = reason, self._detail(run, status, attempt.factor)
         if best is None:
             assert failed is not None
@@ -116,7 +149,7 @@ class Planner(MotionPlanner):
         return best, len(escapes)
 
     def _searched(self, run: _Run, best: Plan, seed: int) -> Plan:
-        """Return the better of the given plan and a joint-space plan."""
+        """Return the better of the given plan and a joint-space plan; without either, why the search failed."""
         settings = self.settings
         if settings.search is None or not settings.avoid or (best.success and settings.effort == 0):
             return best
@@ -128,15 +161,15 @@ class Planner(MotionPlanner):
             run.scene,
             self._work,
             run.request.demonstrated,
-            run.request.goal,
+            run.goal,
             run.q,
             settings,
             run.check,
             seed,
         )
-        if found is None:
-            return best
-        imitated = imitated_path(run.request.demonstrated, run.request.goal)
+        if isinstance(found, SearchFailure):
+            return best if best.success else best._replace(reason=found.reason, detail=found.detail)
+        imitated = imitated_path(run.request.demonstrated, run.goal)
         plan = self._made(
             run,
             joints=found.joints,
@@ -145,10 +178,41 @@ class Planner(MotionPlanner):
             path_poses=found.path.dqs,
             margin=found.margin,
             guide=found.guide,
-            imitated_share=_imitated_share(imitated.dqs, found.path.dqs, settings.motion.guide),
+            imitated_share=imitated_share(imitated.dqs, found.path.dqs, settings.motion.guide),
             next_feasible=found.next_feasible or run.check is None or not run.check.required,
         )
         return _better(best, plan) if best.success else plan
+
+    def _to_joints(self, run: _Run, goal: np.ndarray, lead: np.ndarray) -> Plan:
+        """Return a plan to goal joints: along the demonstration if it ends beside them, else by a search."""
+        settings, seed = self.settings, run.request.seed
+        attempt = Attempt(settings.motion.guide, settings.biases[0], detours=False)
+        _, pursuit, margin = self._closed_loop(run, lead, attempt, seed)
+        if pursuit == ARRIVED and self._is_straight():
+            found = self._plan(run, "direct", margin, attempt)
+            rest = line_to(self.arm, run.scene, found.joints[-1], goal, settings)
+            if rest is not None:
+                found = found._replace(joints=np.vstack([found.joints, rest[1:]]))
+                return self._ended(run, found)
+        searches = settings.search.to_joints if settings.search is not None and settings.avoid else 0
+        joints = plan_to_joints(self.arm, run.scene, run.q, goal, settings, seed) if searches else None
+        if joints is None:
+            return self._failed(run, "no path to the goal joints", f"{searches} searches in joint space")
+        plan = self._made(
+            run,
+            joints=joints,
+            how="joint search",
+            imitated_poses=imitated_path(run.request.demonstrated, run.goal).dqs,
+            path_poses=tool_path(self.arm, joints),
+            margin=0.0,
+            imitated_share=0.0,
+        )
+        return self._ended(run, plan)
+
+    def _ended(self, run: _Run, plan: Plan) -> Plan:
+        """Return the plan with its joint margin, and whether the next motion is possible from its end."""
+        margins = np.minimum(plan.joints - self.arm.lower, self.arm.upper - plan.joints)
+        return plan._replace(margin=float(margins.min()), next_feasible=self._next_is_feasible(run, plan.joints[-1]))
 
     def _is_good(self, plan: Plan) -> bool:
         settings = self.settings
@@ -187,28 +251,17 @@ class Planner(MotionPlanner):
         forward_into(self.arm.chain, q, np.empty((self.arm.dof, FRAME.width)), out)
         return out
 
-    def _unfit(self, scene: PlanningScene, q: np.ndarray, goal: Pose) -> tuple[str, str]:
-        """Reason and detail why start or goal is impossible; "" if both are possible."""
-        if self.arm.margin(q) < 0.0:
-            margins = np.minimum(q - self.arm.lower, self.arm.upper - q)
-            joint = int(np.argmin(margins))
-            return "start beyond a joint limit", f"{self.arm.joint_names[joint]} by {-margins[joint]:.3f} rad"
-        if self.settings.guard and scene.slack(q) < 0.0:
-            return "start in collision", str(scene.tightest(q))
-        # a planner with neither detours nor guard ignores obstacles
-        if (self.settings.guard or self.settings.avoid) and scene.tool_slack(goal) < 0.0:
-            return "goal in collision", str(scene.tightest_of_tool(goal))
-        return "", ""
-
     def _detail(self, run: _Run, status: int, factor: float) -> str:
         """The facts of an escape that failed."""
         rows, repet = int(self._buffers.counts[COUNT.tree_rows]), self.settings.repet
         if status == START_IN_COLLISION:
             return str(run.scene.tightest_of_tool(Pose(self._pose(run.q)), factor))
         if status == GOAL_IN_COLLISION:
-            return str(run.scene.tightest_of_tool(run.request.goal, factor))
+            return str(run.scene.tightest_of_tool(run.goal, factor))
         if status == NODE_LIMIT:
             return f"a tree had {repet.nodes} nodes, see repet.nodes"
+        if status == TOO_LONG:
+            return f"blend and detours would have more than {repet.longest} poses, see repet.longest"
         return f"{rows} nodes in the last of {repet.retries + 1} trees" if status == NO_ESCAPE else ""
 
     def _closed_loop(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
@@ -220,11 +273,11 @@ class Planner(MotionPlanner):
         b.options[OPTION.largest_margin] = run.scene.widest(attempt.factor)
         if attempt.early:
             b.options[OPTION.candidates] = 1.0
-        if not self.settings.avoid:
+        if not (self.settings.avoid and attempt.detours):
             b.options[OPTION.rounds] = 0.0
         b.state[0] = float(seed % 2147483646) + 1.0
         return plan_closed_loop(
-            self._work, run.scene.robot, tool, run.request.demonstrated.dqs, run.request.goal.dq, lead, run.q.copy(),
+            self._work, run.scene.robot, tool, run.request.demonstrated.dqs, run.goal.dq, lead, run.q.copy(),
             attempt.guide, self.settings.spacing, motion.dt, b, self._pursuit_state, self._wish, self._out,
         )  # fmt: skip
 
@@ -243,7 +296,7 @@ class Planner(MotionPlanner):
             margin=float(margin),
             changed=int(counts[COUNT.changed]),
             guide=int(counts[COUNT.guide]),
-            imitated_share=1.0 if whole else _imitated_share(imitated, path, guide),
+            imitated_share=1.0 if whole else imitated_share(imitated, path, guide),
         )
 
     def _failed(self, run: _Run, reason: str, detail: str, *, tried: bool = False) -> Plan:
@@ -266,21 +319,6 @@ class Planner(MotionPlanner):
         empty = {"reason": "", "how": "", "tree_rows": self._buffers.tree[:0], "detours": 0, "changed": 0}
         same = {"arm": self.arm, "body": self.body, "settings": self.settings, "dt": self.settings.motion.dt}
         return Plan(**{**empty, **same, "request": run.request, "tries": 0, "seconds": 0.0, **found})
-
-
-def _imitated_share(imitated: np.ndarray, path: np.ndarray, guide: float) -> float:
-    """Length of the imitated path's (n, 8) edges that a path (m, 8) contains, over that behind the guiding pose.
-
-    Poses are compared bit by bit: followed poses are copies.
-    """
-    if len(imitated) < 2:
-        return 1.0
-    rows = {row.tobytes() for row in path}
-    there = np.array([row.tobytes() in rows for row in imitated])
-    whole = PosePath(imitated)
-    lengths = whole.lengths()
-    wanted = lengths[-1] - lengths[guide_index(whole, guide)]
-    return float(np.diff(lengths) @ (there[1:] & there[:-1]) / wanted) if wanted > 0.0 else 1.0
 
 
 def _better(one: Plan, other: Plan) -> Plan:

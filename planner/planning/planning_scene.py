@@ -6,19 +6,22 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..arrays import check_capacity, checked_array, checked_items, checked_kind
 from ..collision.capsule_placement import place_capsules, place_frames
 from ..collision.clearance import find_near, slack_at
 from ..collision.edge_certificates import pose_tool, tool_arrays, tool_slack
 from ..collision.robot_arrays import HEADER, LAST_LOOK, NEAR_PAIR, ROW, SETTING, robot_arrays, with_obstacles
 from ..collision.self_collision import body_pairs
-from ..errors import BadOption
+from ..errors import BadOption, told_apart
 from ..escape.repet import MAX_OBSTACLES
 from ..geometry.pose import Pose
 from ..geometry.shapes import OBSTACLE, Obstacle, pack
 from ..robot.arm import Arm
 from ..robot.body import BODY, Body
-from ..safety.safety_layer import SafetySettings, contact_masks
+from ..safety.robot_checks import check_bodies, contact_masks
+from ..safety.safety_layer import SafetySettings
 
 if TYPE_CHECKING:
     from .settings import PlanSettings
@@ -28,17 +31,24 @@ def checked_obstacles(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
     """Return the obstacles as a tuple.
 
     Raises:
+        WrongType: an item is no obstacle.
         BadOption: there are more than `MAX_OBSTACLES`: every query visits all of them.
     """
-    if len(obstacles) > MAX_OBSTACLES:
-        raise BadOption("obstacles", f"there are {len(obstacles)}; allowed are {MAX_OBSTACLES}")
-    return tuple(obstacles)
+    checked = checked_items("obstacles", obstacles, Obstacle)
+    check_capacity("obstacles", len(checked), MAX_OBSTACLES)
+    return checked
 
 
 PLACE = slice(OBSTACLE.center, OBSTACLE.ball)
 """Columns of an obstacle that change when it moves."""
 VELOCITY = slice(OBSTACLE.velocity, OBSTACLE.ball)
 """Columns of the velocity of an obstacle."""
+
+
+CONTACT_ROOM = 0.005
+"""Distance [m] by which a wanted contact may be deeper on the way than at the ends: edges are proven with some room."""
+ROUNDING = 1e-6
+"""Slack [m] that rounding may take from a step that was proven."""
 
 
 class Tightest(NamedTuple):
@@ -60,7 +70,10 @@ class Tightest(NamedTuple):
         """The pair in words, for messages."""
         if self.distance <= 0.0:
             return f"{self.part} touches {self.other}"
-        return f"{self.part} is {1e3 * self.distance:.1f} mm from {self.other}, which must be {1e3 * self.margin:.1f}"
+        distance, margin = told_apart(1e3 * self.distance, 1e3 * self.margin, 1)
+        if self.distance >= self.margin:
+            return f"{self.part} is {distance} mm from {self.other}, no less than the {margin} that it must be"
+        return f"{self.part} is {distance} mm from {self.other}, which must be {margin}"
 
 
 class SceneTemplate:
@@ -75,14 +88,16 @@ class SceneTemplate:
     """
 
     def __init__(self, arm: Arm, body: Body, safety: SafetySettings, dt: float, *, guard: bool = True):
+        check_bodies((checked_kind("arm", arm, Arm),), (checked_kind("body", body, Body),))
         nothing = pack(())
+        self.arm = arm
         self.names, self.safety = body.names, safety
         self.at_tool = np.flatnonzero(body.rows[:, BODY.frame] == arm.dof - 1)
         self.tool_names = tuple(body.names[row] for row in self.at_tool)
         pairs = body_pairs(arm, body, safety.self_distance)
         self.robot = robot_arrays((arm,), (body,), nothing, pairs=pairs, settings=safety.packed(dt))
         self.alone = None if guard else robot_arrays((arm,), (body,), nothing, settings=safety.packed(dt))
-        self.tool = tool_arrays(body.tool(arm), nothing)
+        self.tool = tool_arrays(body.tool(arm), nothing, hulls=body.tool_hulls(arm))
 
 
 class PlanningScene:
@@ -106,6 +121,7 @@ class PlanningScene:
     ):
         packed, self._distance = pack(obstacles), distance
         self._template = template
+        self._obstacles, self._allowed = tuple(obstacles), tuple(allowed)
         self._names = [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(obstacles)]
         masks = contact_masks(template.names, obstacles, allowed)
         self.seen = with_obstacles(template.robot, packed, masks, template.safety.distance)
@@ -143,8 +159,51 @@ class PlanningScene:
         template = SceneTemplate(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
         return PlanningScene(template, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
+    def with_contacts_as_at(self, *ends: np.ndarray) -> np.ndarray:
+        """Return the array for queries in which wanted contacts are no deeper than at the ends of a motion.
+
+        `seen` exempts a wanted contact altogether, so that a way may lead right through the obstacle. Here the obstacle
+        stands twice: once for all other parts, once for those that may touch it, with a margin of its own.
+
+        Args:
+            ends: (dof,) joints each.
+        """
+        names, count = self._template.names, len(self._obstacles)
+        masks = contact_masks(names, self._obstacles, self._allowed)
+        touched = [k for k, mask in enumerate(masks) if mask]
+        if not touched:
+            return self.seen
+        twins = pack((*self._obstacles, *(self._obstacles[k] for k in touched)))
+        others = [((1 << len(names)) - 1) & ~masks[k] for k in touched]
+        work = with_obstacles(self._template.robot, twins, [*masks, *others], self.robot_distance)
+        margins = work[ROW.obstacles + count : ROW.obstacles + len(twins.rows), OBSTACLE.margin]
+        wanted, widest = margins.copy(), float(margins.max())
+        for q in ends:
+            place_capsules(work, q, ROW.placed)
+            find_near(work, widest)
+            for row in self._near(work):
+                twin = int(row[NEAR_PAIR.other]) - count
+                if row[NEAR_PAIR.self_pair] == 0.0 and twin >= 0:
+                    wanted[twin] = min(wanted[twin], row[NEAR_PAIR.distance] - CONTACT_ROOM)
+        margins[:] = wanted
+        work[ROW.last_look, LAST_LOOK.valid] = 0.0
+        return work
+
+    def keeps_contacts(self, joints: np.ndarray) -> bool:
+        """Return whether a guarded motion (t, dof) is nowhere deeper in a wanted contact than at its ends."""
+        if not self._allowed or self._template.alone is not None:
+            return True
+        seen = self.with_contacts_as_at(joints[0], joints[-1])
+        return all(slack_at(seen, q, 0.0, 0.1) >= -ROUNDING for q in joints)
+
     def move(self, obstacles: Sequence[Obstacle]) -> None:
-        """Move the same obstacles to other places, with other velocities."""
+        """Move the same obstacles to other places, with other velocities.
+
+        Raises:
+            BadOption: there are fewer or more than before.
+        """
+        if len(obstacles) != len(self._names):
+            raise BadOption("obstacles", f"there are {len(obstacles)}; the scene has {len(self._names)}")
         rows = pack(obstacles).rows
         for work in (self.seen, self._tool):
             work[ROW.obstacles : ROW.obstacles + len(rows), PLACE] = rows[:, PLACE]
@@ -160,12 +219,17 @@ class PlanningScene:
         """Return the largest margin [m] in the tool's array."""
         return max([factor * self._distance, *self._margins[self._own]])
 
+    def checked_joints(self, joints: ArrayLike) -> np.ndarray:
+        """Return joints (t, dof) as the kernels take them."""
+        return checked_array("joints", joints, (None, self._template.arm.dof))
+
     def slack(self, q: np.ndarray) -> float:
         """Return the slack [m] of the whole arm at joints q (dof,), up to 1 m."""
-        return float(slack_at(self.seen, q, 0.0, 1.0))
+        return float(slack_at(self.seen, self._template.arm.checked(q), 0.0, 1.0))
 
     def tool_slack(self, pose: Pose) -> float:
         """Return the slack [m] of the tool at a pose of the tcp beyond the safety margin, up to 1 m."""
+        checked_kind("pose", pose, Pose)
         return float(tool_slack(self.safe_tool(), tuple(float(value) for value in pose.dq), 1.0))
 
     def safe_tool(self) -> np.ndarray:
@@ -183,7 +247,7 @@ class PlanningScene:
 
     def tightest(self, q: np.ndarray) -> Tightest | None:
         """Return the whole arm's pair with the least slack at joints q (dof,); None if no pair is within its margin."""
-        place_capsules(self.seen, q, ROW.placed)
+        place_capsules(self.seen, self._template.arm.checked(q), ROW.placed)
         return self._tightest(self.seen, self._template.names)
 
     def tightest_of_tool(self, pose: Pose, factor: float | None = None) -> Tightest | None:

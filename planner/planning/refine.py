@@ -15,11 +15,12 @@ from ..collision.edge_certificates import is_clear
 from ..control.arm_arrays import arm_arrays
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..errors import PlanFailed
-from ..geometry.pose import PosePath
+from ..geometry.pose import Pose, PosePath
 from ..geometry.smooth_path import smooth, thinned
+from ..ranges import check_range, ticks_of
 from ..safety.guarded_pursuit import guarded_roll_out
 from .joint_space_rrt import joint_edge_is_clear
-from .plan import Plan
+from .plan import Plan, check_success
 from .planning_scene import PlanningScene
 from .time_optimal import time_optimal
 
@@ -36,23 +37,30 @@ def smoothed(plan: Plan, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
 
     Args:
         plan: a plan along a path of the tool.
-        tolerance: path length [m] by which poses may be off those the curve is laid through.
+        tolerance: path length [m] by which poses may be off those the curve is laid through; 0 where the curve would
+            not be clear otherwise.
 
     Raises:
-        PlanFailed: "plan_failed": the plan failed, it leads through joint space, or the curve is not clear or not
-            followed to its end.
+        WrongType: no plan.
+        BadOption: the tolerance is negative or not a number.
+        PlanFailed: "plan_failed": the plan failed, it leads through joint space or to given joints, or the curve is not
+            clear or not followed to its end.
     """
-    _require_success(plan, "make smooth")
+    check_success(plan, "make smooth")
+    check_range("tolerance", tolerance, "[0, inf]")
     if plan.how == "joint search":
         raise PlanFailed("plan_failed", "a way through joint space has no path of the tool to make smooth")
+    if not isinstance(plan.request.goal, Pose):
+        raise PlanFailed("plan_failed", "a smooth path of the tool would not end at the given joints")
     arm, motion, scene = plan.arm, plan.settings.motion, scene_of(plan)
-    path = PosePath(arm.fk(plan.joints[0]).dq[None]).joined(plan.path)
-    curve = smooth_clear_path(path, scene.safe_tool(), scene.widest_safe, tolerance=tolerance)
+    start = scene.checked_joints(plan.joints)[0].copy()
+    path = PosePath(arm.fk(start).dq[None]).joined(plan.path)
+    curve = _clear_curve(path, scene, tolerance)
     work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
     wish, out = np.empty((2, arm.dof))
-    trace = np.empty((round(plan.settings.max_seconds / motion.dt) + 1, arm.dof))
+    trace = np.empty((ticks_of(plan.settings.max_seconds, motion.dt) + 1, arm.dof))
     status, last, margin, changed = guarded_roll_out(
-        work, scene.robot, curve.dqs, plan.joints[0].copy(), motion.dt, fresh_pursuit_state(), wish, out, trace, 0
+        work, scene.robot, curve.dqs, start, motion.dt, fresh_pursuit_state(), wish, out, trace, 0
     )
     if status != ARRIVED:
         raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * motion.dt:.2f} s")
@@ -65,6 +73,15 @@ def smoothed(plan: Plan, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
     )
 
 
+def _clear_curve(path: PosePath, scene: PlanningScene, tolerance: float) -> PosePath:
+    """A clear curve near a path; through every pose of the path where one through fewer cuts a corner."""
+    tool, widest = scene.safe_tool(), scene.widest_safe
+    try:
+        return smooth_clear_path(path, tool, widest, tolerance=tolerance)
+    except PlanFailed:
+        return smooth_clear_path(path, tool, widest, tolerance=0.0)
+
+
 def timed(plan: Plan, acceleration_limits: ArrayLike = ACCELERATION) -> Plan:
     """Return the plan's joints on a C2 spline, from rest to rest, as fast as velocity and acceleration limits allow.
 
@@ -73,11 +90,11 @@ def timed(plan: Plan, acceleration_limits: ArrayLike = ACCELERATION) -> Plan:
         acceleration_limits: (dof,) or one number [rad/s^2].
 
     Raises:
+        WrongType, BadShape, BadOption: no plan, or limits that are not (dof,) positive numbers.
         PlanFailed: "plan_failed": the plan failed, or the spline between its points is not clear.
     """
-    _require_success(plan, "time")
-    limits = np.broadcast_to(np.asarray(acceleration_limits, dtype=np.float64), (plan.arm.dof,))
-    result = time_optimal(plan.joints, plan.arm.velocity_limits, limits, plan.dt)
+    check_success(plan, "time")
+    result = time_optimal(plan.joints, plan.arm.velocity_limits, acceleration_limits, plan.dt)
     check_joints_are_clear(result.joints, result.time, scene_of(plan))
     margin = min(plan.arm.margin(q) for q in result.joints)
     # a timed motion is no closed loop any more
@@ -110,15 +127,10 @@ def check_joints_are_clear(joints: np.ndarray, time: np.ndarray, scene: Planning
     Raises:
         PlanFailed: "plan_failed", with the time.
     """
-    for k, (a, b) in enumerate(pairwise(joints)):
-        if not joint_edge_is_clear(scene.seen, np.ascontiguousarray(a), np.ascontiguousarray(b)):
+    for k, (a, b) in enumerate(pairwise(scene.checked_joints(joints))):
+        if not joint_edge_is_clear(scene.seen, a, b):
             detail = f"the timed motion is not clear at {time[k]:.2f} s: the spline leaves the plan there"
             raise PlanFailed("plan_failed", detail)
-
-
-def _require_success(plan: Plan, what: str) -> None:
-    if not plan.success:
-        raise PlanFailed("plan_failed", f"there is no plan to {what}: {plan.why}")
 
 
 def smooth_clear_path(

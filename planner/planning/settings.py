@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from ..arrays import checked_array, numbers
 from ..control.controller import ControllerSettings
 from ..control.pursuit import PursuitSettings
 from ..errors import BadOption
 from ..escape.repet import Corner, RepetSettings
-from ..ranges import check_ranges
+from ..ranges import check_counts, check_ranges, ticks_of
 from ..safety.safety_layer import SafetySettings
 
 
@@ -34,7 +35,9 @@ class MotionSettings:
     dt: float = 0.02
 
     def __post_init__(self):
-        if not 0.0 <= self.guide <= self.max_guide <= 1.0:
+        check_ranges(self, "[0, 1]", "guide", "max_guide")
+        check_ranges(self, "(0, inf)", "dt")
+        if self.guide > self.max_guide:
             raise BadOption("guide", f"need 0 <= guide <= max_guide <= 1, got {self.guide} and {self.max_guide}")
         check_ranges(self, "[0, inf]", "departure")
 
@@ -54,6 +57,9 @@ class JointSearchSettings:
         margin: joint margin [rad] that a posture should have, so that the next motion is possible.
         late: cost [rad] of joining the imitated path only at its end.
         shortcuts: number of straight lines tried in place of stretches of the path.
+        to_joints: number of searches for a goal given as joints, each with other random numbers.
+        shortcuts_to_joints: as `shortcuts`, for a goal given as joints; more corners would cost more time than their
+            lines save, since the arm rests at each.
         speed: share of the largest joint speed at which the path is followed.
     """
 
@@ -67,12 +73,16 @@ class JointSearchSettings:
     margin: float = 0.15
     late: float = 3.0
     shortcuts: int = 300
+    to_joints: int = 40
+    shortcuts_to_joints: int = 30
     speed: float = 0.4
 
     def __post_init__(self):
         check_ranges(self, "(0, 10]", "step", "speed")
         check_ranges(self, "[0, 1000]", "late")
-        check_ranges(self, "[1, 1000000]", "iterations", "nodes", "seeds", "targets", "postures", "rounds")
+        check_ranges(self, "[0, inf)", "margin")
+        check_counts(self, "[1, 1000000]", "iterations", "nodes", "seeds", "targets", "postures", "rounds", "to_joints")
+        check_counts(self, "[0, 1000000]", "shortcuts", "shortcuts_to_joints")
 
 
 BIASES: tuple[Corner, ...] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0))
@@ -123,9 +133,12 @@ class PlanSettings:
         check_ranges(self, "[0, inf]", "end_margin")
         check_ranges(self, "[0, 100]", "effort")
         check_ranges(self, "(0, inf]", "max_deviation")
-        if not self.biases:
+        if not numbers("biases", self.biases).size:
             raise BadOption("biases", "there must be at least one")
+        biases = checked_array("biases", self.biases, (None, 3))
+        object.__setattr__(self, "biases", tuple(tuple(bias) for bias in biases.tolist()))
         check_ranges(self, "(0, 3600)", "spacing", "max_seconds")
+        ticks_of(self.max_seconds, self.motion.dt)
         if self.repet.distance * self.tight < self.safety.distance:
             reason = f"{self.repet.distance} times {self.tight} is below the safety distance {self.safety.distance}"
             raise BadOption("repet.distance", reason)

@@ -17,7 +17,8 @@ from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
-from ..errors import BadOption, BadShape, NotFinite, PlanFailed
+from ..arrays import checked_array, frozen, numbers
+from ..errors import BadOption, BadShape, PlanFailed
 from ..ranges import check_range
 
 REPEAT = 1e-8
@@ -52,9 +53,7 @@ class TimedPath:
 
     def __post_init__(self):
         for name in ("time", "joints", "velocities"):
-            value = np.array(getattr(self, name), dtype=np.float64)
-            value.flags.writeable = False
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, frozen(numbers(name, getattr(self, name))))
 
     @property
     def duration(self) -> float:
@@ -84,10 +83,12 @@ def time_optimal(joints: ArrayLike, velocity_limits: ArrayLike, acceleration_lim
         dt: seconds between samples.
 
     Raises:
-        BadShape, NotFinite, BadOption: waypoints, limits or dt cannot be used.
+        WrongType, BadShape, NotFinite, BadOption: waypoints, limits or dt cannot be used.
         PlanFailed: "plan_failed", no timing was found.
     """
-    waypoints = _checked(joints)
+    waypoints = checked_array("joint path", joints, (None, None))
+    if 0 in waypoints.shape:
+        raise BadShape("joint path", waypoints.shape, "(n, dof) with n >= 1")
     speeds = _limits("velocity_limits", velocity_limits, waypoints.shape[1])
     accelerations = _limits("acceleration_limits", acceleration_limits, waypoints.shape[1])
     check_range("dt", dt, "(0, inf)")
@@ -104,17 +105,8 @@ def time_optimal(joints: ArrayLike, velocity_limits: ArrayLike, acceleration_lim
     return _sampled(spline, profile, stretch, dt, waypoints[-1])
 
 
-def _checked(joints: ArrayLike) -> np.ndarray:
-    array = np.asarray(joints, dtype=np.float64)
-    if array.ndim != 2 or 0 in array.shape:
-        raise BadShape("joint path", array.shape, "(n, dof) with n >= 1")
-    if not np.isfinite(array).all():
-        raise NotFinite("joint path", tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0]))
-    return array
-
-
 def _limits(name: str, value: ArrayLike, dof: int) -> np.ndarray:
-    array = np.asarray(value, dtype=np.float64)
+    array = numbers(name, value)
     if array.shape not in ((), (dof,)):
         raise BadShape(name, array.shape, f"({dof},) or a scalar")
     if not ((array > 0.0) & (array < np.inf)).all():

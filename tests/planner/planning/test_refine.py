@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.arms import table_panda
 
-from onedemo.envs import ROBOTS
-from onedemo.envs.scene.robot_bodies import robot_body
-from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.collision.edge_certificates import tool_arrays
 from onedemo.planner.errors import PlanFailed
 from onedemo.planner.escape.repet import clear_of, escape_path, point_tool
@@ -30,8 +28,7 @@ START = np.array([0.0, 0.4, 0.0, -2.2, 0.0, 2.6, 0.78])
 
 
 def planned(obstacles):
-    scene = compiled_scene(ROBOTS["Panda"])
-    arm, body = scene.arms[0].arm, robot_body(ROBOTS["Panda"])
+    arm, body, _ = table_panda()
     start = arm.fk(START)
     goal = Pose.from_position_quaternion([0.0, 0.35, 0.0]) @ start
     return arm, body, Planner(arm, body).plan(screw_path(start, goal, 0.01), START, goal, obstacles)
@@ -64,7 +61,7 @@ def bends(path):
 
 @pytest.mark.parametrize("things", [0, 1])
 def test_a_timed_plan_keeps_limits_ends_and_distance(things):
-    ball = [ball_between(compiled_scene(ROBOTS["Panda"]).arms[0].arm)][:things]
+    ball = [ball_between(table_panda()[0])][:things]
     arm, body, plan = planned(ball)
     assert plan.success and plan.how == ("escape" if things else "direct")
     fast = timed(plan, 3.0)
@@ -80,7 +77,7 @@ def test_a_timed_plan_keeps_limits_ends_and_distance(things):
 
 @pytest.mark.parametrize("things", [0, 1])
 def test_a_smooth_plan_bends_less_and_is_clear(things):
-    ball = [ball_between(compiled_scene(ROBOTS["Panda"]).arms[0].arm)][:things]
+    ball = [ball_between(table_panda()[0])][:things]
     arm, body, plan = planned(ball)
     smooth = smoothed(plan)
     assert smooth.success and smooth.refined == ("smooth",)
@@ -108,7 +105,7 @@ def test_what_the_spline_or_the_curve_runs_into_is_refused():
 
 
 def test_without_a_plan_there_is_nothing_to_refine():
-    arm = compiled_scene(ROBOTS["Panda"]).arms[0].arm
+    arm = table_panda()[0]
     goal = arm.fk(START).position + np.array([0.0, 0.35, 0.0])
     plan = planned([Obstacle(Sphere(0.1), Pose.from_position_quaternion(goal), name="ball")])[2]
     for refine in (timed, smoothed):

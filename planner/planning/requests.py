@@ -1,0 +1,115 @@
+"""Checks of a request before it is planned, and the bound on the length of its paths."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays import checked_kind
+from ..errors import BadOption
+from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
+from ..imitation.reduction import reduced
+from ..ranges import check_count
+from ..robot.arm import Arm
+from .joint_goal import beyond_limit, checked_goal
+from .plan import NextMotion, PlanRequest
+from .planning_scene import PlanningScene, checked_obstacles
+from .settings import PlanSettings
+
+ROUNDING = 1e-6
+"""How far [rad or m] a start may be beyond a joint limit to be taken for one at the limit."""
+LEAVING_TOLERANCE = 0.01
+"""Largest weighted distance [m] from the tool at the start to the beginning of the path by which the start is left."""
+
+
+def checked_request(request: PlanRequest, arm: Arm) -> PlanRequest:
+    """Return a request that can be planned: its start, and a goal of joints, as arrays of their own.
+
+    Joints that are beyond a limit by no more than `ROUNDING` are at the limit.
+
+    Args:
+        request: the request.
+        arm: the arm that moves.
+
+    Raises:
+        WrongType, BadShape, NotFinite: a part of the request is of a wrong class; the start, or a goal given as joints,
+            is not (dof,) finite numbers.
+        BadOption: there are too many obstacles, `leaving` begins elsewhere than at the tool, or the seed is no whole
+            number.
+    """
+    checked_kind("request", request, PlanRequest)
+    checked_kind("demonstrated", request.demonstrated, PosePath)
+    goal = request.goal
+    if not isinstance(goal, Pose):
+        goal = _within_limits(arm, checked_goal(arm, goal))
+    check_count("seed", request.seed, "(-inf, inf)")
+    if request.next_motion is not None:
+        checked_kind("next_motion", request.next_motion, NextMotion)
+        checked_kind("next_motion.path", request.next_motion.path, PosePath)
+    start = _within_limits(arm, arm.checked(request.start))
+    if request.leaving is not None:
+        _check_leaving(arm, start, checked_kind("leaving", request.leaving, PosePath))
+    return request._replace(start=start, goal=goal, obstacles=checked_obstacles(request.obstacles))
+
+
+def reduced_request(request: PlanRequest, most: int) -> tuple[PlanRequest, float]:
+    """Return a request with a bounded number of poses in each of its paths.
+
+    Args:
+        request: a checked request.
+        most: largest number of poses.
+
+    Returns:
+        The request, and the deviation [m] of its demonstrated path, see `ReducedPath`; the same request and 0 if it is
+        short enough.
+    """
+    demonstrated, deviation = reduced(request.demonstrated, most)
+    leaving, then = request.leaving, request.next_motion
+    return request._replace(
+        demonstrated=demonstrated,
+        leaving=None if leaving is None else reduced(leaving, most).path,
+        next_motion=None if then is None else then._replace(path=reduced(then.path, most).path),
+    ), deviation
+
+
+def unfit(arm: Arm, scene: PlanningScene, request: PlanRequest, settings: PlanSettings) -> tuple[str, str]:
+    """Return reason and detail why the start or the goal of a request is impossible; "" if both are possible.
+
+    Args:
+        arm: the arm.
+        scene: the arm among the obstacles.
+        request: a checked request.
+        settings: of the planner.
+    """
+    start, goal = np.asarray(request.start), request.goal
+    if beyond := beyond_limit(arm, start):
+        return "start beyond a joint limit", beyond
+    if settings.guard and scene.slack(start) < 0.0:
+        return "start in collision", str(scene.tightest(start))
+    # a planner with neither detours nor guard ignores obstacles
+    careful = settings.guard or settings.avoid
+    if not isinstance(goal, Pose):
+        if beyond := beyond_limit(arm, np.asarray(goal)):
+            return "goal beyond a joint limit", beyond
+        if careful and scene.slack(np.asarray(goal)) < 0.0:
+            return "goal in collision", str(scene.tightest(np.asarray(goal)))
+    elif careful and scene.tool_slack(goal) < 0.0:
+        return "goal in collision", str(scene.tightest_of_tool(goal))
+    return "", ""
+
+
+def _within_limits(arm: Arm, q: np.ndarray) -> np.ndarray:
+    """Return joints (dof,) as a new array; what is beyond a limit by rounding is at the limit."""
+    nearest = np.clip(q, arm.lower, arm.upper)
+    return np.where(np.abs(q - nearest) <= ROUNDING, nearest, q)
+
+
+def _check_leaving(arm: Arm, start: np.ndarray, leaving: PosePath) -> None:
+    distance, angle = arm.fk(start).distance_to(leaving[0])
+    if not math.hypot(distance, METERS_PER_RADIAN * angle) <= LEAVING_TOLERANCE:
+        reason = (
+            f"begins {1e3 * distance:.1f} mm and {math.degrees(angle):.1f} degrees from the tool at the start; "
+            f"allowed are {1e3 * LEAVING_TOLERANCE:g} mm or {math.degrees(LEAVING_TOLERANCE / METERS_PER_RADIAN):.1f}"
+        )
+        raise BadOption("leaving", reason)
