@@ -1,0 +1,1 @@
+"""`onedemo mbm`: other people's problems, solved to given joints and judged by true meshes."""
