@@ -122,20 +122,49 @@ class HeldItem(ShapeFields):
     tcp_from_object: Placed
 
 
-class UrdfRobot(Strict):
-    """An arm from a URDF file.
+class RobotFile(Strict):
+    """An arm from a URDF or MJCF file.
 
     Attributes:
         urdf: URDF file.
-        tcp_frame: name of the tcp's frame in the file.
-        velocity_limits: largest joint speeds [rad/s or m/s]; None: those of the file.
-        base: pose of the root link in the world; None: the origin.
+        mjcf: MJCF file, instead.
+        tool: name of the tool frame: a link or joint of a URDF, a site or body of an MJCF file.
+        tcp_frame: the same; a former name of the key.
+        velocity_limits: largest joint speeds [rad/s or m/s], one number or one per joint; None: those of the URDF.
+        base: pose of a URDF's root link in the world; None: the origin.
+        base_link: link, or body, where the arm begins: joints before it are held; None: the root.
+        locked: positions of joints to hold [rad or m], by name or shell pattern.
+        package_dirs: folders of the packages of a URDF's package://; None: the folders above the file.
+        srdf: SRDF file with pairs of links that are not checked against each other.
+        visuals: cover links without collision geometry by their visual geometry.
     """
 
-    urdf: str
-    tcp_frame: str
+    urdf: str | None = None
+    mjcf: str | None = None
+    tool: str | None = None
+    tcp_frame: str | None = None
     velocity_limits: list[float] | None = None
     base: Placed | None = None
+    base_link: str | None = None
+    locked: dict[str, float] = Field(default_factory=dict)
+    package_dirs: list[str] | None = None
+    srdf: str | None = None
+    visuals: bool = False
+
+    @model_validator(mode="after")
+    def _one_file_and_one_tool(self) -> RobotFile:
+        for first, second in (("urdf", "mjcf"), ("tool", "tcp_frame")):
+            given = [key for key in (first, second) if getattr(self, key) is not None]
+            if not given:
+                raise _refused(first, f"is missing; it may also be {second}")
+            if len(given) == 2:
+                raise _refused(second, f"cannot stand beside {first!r}: one of them is enough")
+        if self.mjcf is not None and self.velocity_limits is None:
+            raise _refused("velocity_limits", "is missing: MJCF has no speeds")
+        for key in ("base", "package_dirs") if self.mjcf is not None else ():
+            if getattr(self, key) is not None:
+                raise _refused(key, "is for a URDF; an MJCF file says it itself")
+        return self
 
 
 class Recorded(Strict):
@@ -155,7 +184,7 @@ class SceneConfig(Strict):
 
     Attributes:
         title: title of pictures.
-        robot: robosuite's name, or a URDF file.
+        robot: robosuite's name, or a URDF or MJCF file.
         demonstration: a recording, or pose vectors (x y z [m], then quaternion wxyz) joined by screw motions.
         start: start joints [rad or m], or "home".
         goal: goal pose of the tcp, as a pose vector or a table.
@@ -168,8 +197,8 @@ class SceneConfig(Strict):
 
     title: str = ""
     robot: Annotated[
-        Annotated[str, Tag("~text")] | Annotated[UrdfRobot, Tag("~table")],
-        _either("a robot's name, or a table of urdf and tcp_frame"),
+        Annotated[str, Tag("~text")] | Annotated[RobotFile, Tag("~table")],
+        _either("a robot's name, or a table of urdf (or mjcf) and tool"),
     ] = "Panda"
     demonstration: Annotated[
         Annotated[Annotated[list[PoseVector], Field(min_length=1)], Tag("~list")] | Annotated[Recorded, Tag("~table")],

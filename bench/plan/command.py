@@ -10,7 +10,7 @@ import numpy as np
 
 from ...configs import BadConfig
 from ...configs.plan_scene import PlanScene, load_scene, pose_of, shipped_scene
-from ...configs.plan_scene_schema import UrdfRobot
+from ...configs.plan_scene_schema import RobotFile
 from ...planner import (
     Arm,
     Body,
@@ -26,12 +26,14 @@ from ...planner import (
     smoothed,
     write_log,
 )
-from ...planner.errors import BadShape, OneDemoError, PlanFailed
+from ...planner.errors import BadModel, PlanFailed
 from ...planner.planning import refine
 from ...planner.planning.planning_scene import PlanningScene
 from ...planner.planning.refine import ACCELERATION, refused
-from ...planner.safety.safety_layer import contact_masks
+from ...planner.safety.robot_checks import contact_masks
 from ..console import console, labeled
+from ..robot.load_robot import RobotRequest, kind_of, load_robot
+from ..robot.robot_summary import postures_of
 from .scene_plan import ScenePlan
 
 FOUND, NOT_FOUND, REFUSED = 0, 1, 3
@@ -156,8 +158,8 @@ def refined(planned: ScenePlan, *, smooth: bool, timed: bool) -> ScenePlan:
 def _robot(scene: PlanScene) -> tuple[Arm, Body, np.ndarray]:
     """Return arm, body and usual joints (dof,) [rad] of the scene's robot."""
     robot = scene.config.robot
-    if isinstance(robot, UrdfRobot):
-        return _urdf_robot(scene, robot)
+    if isinstance(robot, RobotFile):
+        return _robot_of_file(scene, robot)
     from ...envs.scene.robot_bodies import robot_body
     from ...envs.scene.robots import robot_named
     from ...envs.scene.scene import compiled_scene
@@ -168,27 +170,26 @@ def _robot(scene: PlanScene) -> tuple[Arm, Body, np.ndarray]:
     return compiled.arms[0].arm, robot_body(known), compiled.home[0]
 
 
-def _urdf_robot(scene: PlanScene, robot: UrdfRobot) -> tuple[Arm, Body, np.ndarray]:
-    from ...planner import body_from_urdf
-
+def _robot_of_file(scene: PlanScene, robot: RobotFile) -> tuple[Arm, Body, np.ndarray]:
+    speeds, folders = robot.velocity_limits, robot.package_dirs
+    request = RobotRequest(
+        scene.file(robot.urdf or robot.mjcf or ""),
+        robot.tool or robot.tcp_frame,
+        velocity_limits=speeds[0] if speeds is not None and len(speeds) == 1 else speeds,
+        base=None if robot.base is None else pose_of(robot.base),
+        base_link=robot.base_link,
+        locked=robot.locked,
+        package_dirs=None if folders is None else [scene.file(folder) for folder in folders],
+        srdf=None if robot.srdf is None else scene.file(robot.srdf),
+        visuals=robot.visuals,
+    )
     with scene.blaming("robot"):
-        file = scene.file(robot.urdf)
-        base = None if robot.base is None else pose_of(robot.base)
-        speeds = robot.velocity_limits
-        if speeds is not None and len(speeds) == 1:
-            speeds = speeds[0]
-        arm = _arm_from_urdf(file, robot.tcp_frame, base, speeds)
-        low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
-        return arm, body_from_urdf(file, arm), 0.5 * (low + high)
-
-
-def _arm_from_urdf(file: Path, tcp_frame: str, base: Pose | None, speeds: Any) -> Arm:
-    try:
-        return Arm.from_urdf(file, tcp_frame=tcp_frame, world_from_base=base, velocity_limits=speeds)
-    except OneDemoError:
-        raise
-    except ValueError:  # NumPy could not broadcast the speeds
-        raise BadShape("velocity_limits", np.shape(speeds), "one number, or one per joint") from None
+        expected = "robot" if robot.urdf is not None else "mujoco"
+        if kind_of(request.file) != expected:
+            raise BadModel(request.file, "urdf" if robot.urdf is not None else "mjcf", f"has no <{expected}>")
+        loaded = load_robot(request)
+    low, high = postures_of(loaded.arm)
+    return loaded.arm, loaded.body, 0.5 * (low + high)
 
 
 def _warm_up(planner: Planner, start: np.ndarray) -> None:
@@ -201,6 +202,8 @@ def _warm_up(planner: Planner, start: np.ndarray) -> None:
 def _lines(planned: ScenePlan, certificate: Certificate | None) -> Iterator[tuple[str, str, str]]:
     """Yield label, style and text of every line for the terminal."""
     plan, name = planned.plan, planned.scene.name
+    for warning in planned.arm.report.warnings:
+        yield "warning   ", "yellow", warning
     spent = f"in {_time(plan.seconds)}, {plan.tries} {'try' if plan.tries == 1 else 'tries'}"
     if not plan.success:
         yield "not found ", "red", f"{name}: {plan.why}; {spent}"

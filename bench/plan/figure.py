@@ -13,7 +13,7 @@ import numpy as np
 from ...planner import Body, Certificate, Pose, final_path, guide_index, imitated_path
 from ...planner.imitation.segmentation import resampled
 from ...planner.robot.body import BODY
-from ...planner.robot.link_capsules import joint_frames
+from ...planner.robot.joint_frames import joint_frames
 from ..drawing.convex_view import ConvexSolid, DrawingView, back_to_front, ball_along, best_view, hidden_by, solid_of
 from ..drawing.solids import arm_patch, floor_corners, paint_arm, paint_floor, paint_shells, paint_solid, scale_ends
 from .escape_tree import KEPT, PLANE, REJECTED, paint_tree

@@ -20,7 +20,7 @@ from ...planner.geometry.pose import PosePath
 from ...planner.geometry.shapes import pack
 from ...planner.imitation.tsia import final_path, guide_index, imitated_path
 from ...planner.jit import kernel
-from ...planner.safety.safety_layer import contact_masks
+from ...planner.safety.robot_checks import contact_masks
 from .scene_plan import ScenePlan
 
 LOOPS = 100

@@ -41,7 +41,19 @@ def called(monkeypatch, capsys, *arguments):
 
 @pytest.mark.parametrize(
     "command",
-    [[], ["run"], ["report"], ["plan"], ["reproduce"], ["demo"], ["demo", "check"], ["demo", "import"], ["perf"]],
+    [
+        [],
+        ["run"],
+        ["report"],
+        ["plan"],
+        ["reproduce"],
+        ["demo"],
+        ["demo", "check"],
+        ["demo", "import"],
+        ["robot"],
+        ["robot", "check"],
+        ["perf"],
+    ],
 )
 def test_every_command_explains_itself(command, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")

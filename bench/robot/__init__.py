@@ -1,0 +1,1 @@
+"""Robots from files: read, covered, summed up and drawn."""
