@@ -11,7 +11,11 @@ LEARNING := $(addprefix tests/,bench/train/test_command.py bench/train/test_hind
     baselines/learning/test_export_actor.py baselines/learning/test_learned_policy.py baselines/learning/test_learning_page.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test learn slow lint types check picture perf soak study docs bodies beads clean
+NEWEST := .venv-newest
+OLDEST := .venv-oldest
+PLANNER := tests/planner
+
+.PHONY: help demo test learn slow newest oldest lint types check picture perf soak study docs bodies beads clean
 
 help: ## show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -48,6 +52,20 @@ learn: $(VENV)/.learned ## install torch and Stable-Baselines3 too, run the test
 slow: $(VENV)/.developed ## run the long tests too, on newly drawn values
 	@$(BIN)/python -m pytest --hypothesis-profile=default -n 2 --dist loadfile
 
+newest: ## the planner's and the judge's tests with the newest of all it needs, without a simulator
+	@test -x $(NEWEST)/bin/python || $(PYTHON) -m venv $(NEWEST)
+	@$(PYTHON) .ci/requirements.py newest > $(NEWEST)/requirements.txt
+	@$(NEWEST)/bin/python -m pip --disable-pip-version-check install --quiet --upgrade --requirement $(NEWEST)/requirements.txt
+	@$(NEWEST)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --editable .
+	@$(NEWEST)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile $(PLANNER)
+
+oldest: ## the tests with the lowest allowed version of all that is needed; PYTHON=python3.10
+	@test -x $(OLDEST)/bin/python || $(PYTHON) -m venv $(OLDEST)
+	@$(PYTHON) .ci/requirements.py oldest > $(OLDEST)/requirements.txt
+	@$(OLDEST)/bin/python -m pip --disable-pip-version-check install --quiet --requirement $(OLDEST)/requirements.txt
+	@$(OLDEST)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --editable .
+	@$(OLDEST)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile
+
 lint: $(VENV)/.developed ## ruff
 	@$(BIN)/ruff check $(FOLDERS)
 	@$(BIN)/ruff format --check --quiet $(FOLDERS)
@@ -80,4 +98,4 @@ beads: $(VENV)/.developed ## let the beads settle in their glasses anew (for a n
 	@$(BIN)/python -c "from onedemo.envs.pour import geometry as g, places as p; from onedemo.envs.scene import beads; beads.TABLE.write_text(beads.table_text(((p.WIDE, g.BEADS), (p.SLIM, g.BEADS))))"
 
 clean: ## remove the environment, the caches and the builds; runs/ stays
-	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) $(NEWEST) $(OLDEST) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

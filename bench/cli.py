@@ -11,6 +11,8 @@ import typer
 from . import demonstrations as demo_commands
 from .console import console, labeled, missing_library
 from .interruption import INTERRUPTED
+from .mbm.options import mbm
+from .robot import command as robot_commands
 
 BAD_INPUT = 2
 USAGE: Any = typer.BadParameter.__base__
@@ -23,6 +25,7 @@ app = typer.Typer(
     add_completion=False,
 )
 app.add_typer(demo_commands.app, name="demo")
+app.add_typer(robot_commands.app, name="robot")
 
 
 @app.command()
@@ -224,6 +227,9 @@ def perf(
     from .perf.command import run_perf
 
     raise typer.Exit(run_perf(only, json))
+
+
+app.command()(mbm)
 
 
 @app.command()

@@ -27,7 +27,7 @@ MOVED = {
     "envs.shelf_places": "envs.shelve.places",
     "envs.task": "envs.core.description",
     "planner.arm": "planner.robot.arm",
-    "planner.body_models": "planner.robot.body_readers",
+    "planner.body_models": "planner.fitting.body_readers",
     "planner.certify": "planner.judge.certify",
     "planner.controller": "planner.control.controller",
     "planner.demo": "planner.imitation.demonstration",

@@ -17,8 +17,8 @@ LOWER = {
 }
 ORDER = {
     "planner": """
-        errors lazy_names ranges jit columns strict_json geometry robot collision control imitation log escape
-        safety judge planning reactive
+        errors lazy_names ranges arrays jit columns strict_json geometry models robot collision fitting control
+        imitation log escape safety judge planning reactive
     """,
     "envs": "errors registration scene simulation core stack pour shelve",
     "configs": """
@@ -31,30 +31,32 @@ ORDER = {
     """,
     "bench": """
         console atomic_files statistics provenance interruption task_table method_table demonstrations
-        drawing document metrics plan workers episodes report geometric run task_pages reproduce train
-        curves perf cli
+        drawing document robot metrics plan workers episodes report geometric run task_pages reproduce train
+        curves perf mbm cli
     """,
     "face": "former_paths",
 }
 """Sub-packages, and files that lie in none, from the lowest up: each imports only from those before it."""
-ENVS_MAY_USE = {"planner.errors", "planner.jit", "planner.geometry", "planner.robot"}
+ENVS_MAY_USE = {"planner.errors", "planner.jit", "planner.geometry", "planner.robot", "planner.fitting"}
 ENVS_MAY_USE |= {"planner.collision.proximity", "planner.control.inverse_kinematics", "planner.control.linear"}
 """Geometry and kinematics of the planner, no method."""
 SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
-READERS = {"planner/robot/chain_readers.py", "planner/robot/body_readers.py", "planner/judge/geometry.py"}
+READERS = {"planner/models/urdf_model.py", "planner/judge/geometry.py"}
 USERS = {
     "robosuite": {"envs/scene/robosuite_model.py", "bench/perf/command.py"},
-    "pinocchio": {*READERS, "bench/perf/peers.py"},
+    "pinocchio": {*READERS, "bench/perf/peers.py", "bench/mbm/mesh_judge.py"},
     "numba": {"planner/jit.py"},
 }
 """Who alone imports a heavy library."""
 JUDGE_SHARES = {
     "planner.errors",
+    "planner.arrays",
     "planner.jit",
     "planner.strict_json",
     "planner.ranges",
     "planner.columns",
     "planner.geometry",
+    "planner.models",
     "planner.robot",
     "planner.log",
 }

@@ -67,7 +67,8 @@ def libraries() -> set[str]:
 def is_known(name: str) -> bool:
     """True if a dotted name is of the code, its tests or a library that it uses; or a command."""
     if name.startswith("onedemo "):
-        return f"bench.cli.{name.split()[1]}" in defined()
+        command = name.split()[1]
+        return bool({f"bench.cli.{command}", f"bench.{command}.options.{command}"} & defined().keys())
     first, _, rest = name.removeprefix("onedemo.").partition(".")
     if first in libraries():
         return not rest or hasattr(import_module(first), rest)

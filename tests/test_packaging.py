@@ -54,7 +54,7 @@ def test_the_wheel_holds_code_configs_demonstrations_and_licences(tmp_path):
         f"onedemo/{path.relative_to(ROOT)}".replace("onedemo/face/", "onedemo/")
         for folder in PACKAGES
         for path in (ROOT / folder).glob("**/*")
-        if path.suffix in (".py", ".yaml", ".npz", ".safetensors", ".typed") or path.name.startswith("LICENSE")
+        if path.suffix in (".py", ".yaml", ".npz", ".safetensors", ".typed", ".xz") or path.name.startswith("LICENSE")
     }
     sources |= {f"onedemo/{path.relative_to(ROOT)}" for path in (ROOT / "configs").glob("**/*.json")}
     assert {f"onedemo/configs/{name}" for name in ("actors/README.md", "rl_zoo3/sac.yaml")} <= names

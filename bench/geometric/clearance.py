@@ -98,7 +98,8 @@ class ToolJudge:
         ends = np.einsum("nij,mej->nmei", turn, self._ends) + place[:, None, None]
         turns = turn[:, None] @ self._turns
         nothing = np.empty((len(poses), 0, 3))
-        return Moment(np.zeros(len(poses)), np.empty((len(poses), 0)), nothing, nothing, ends, turns, turn)
+        places = np.empty((len(poses), 0, 4, 4))
+        return Moment(np.zeros(len(poses)), np.empty((len(poses), 0)), nothing, nothing, ends, turns, places, turn)
 
     def _displacements(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         """Return bounds (n, m) on the displacement [m] of the points of each capsule along the screws."""
