@@ -13,7 +13,11 @@ LEARNING := $(addprefix tests/,bench/train/test_command.py bench/train/test_hind
 .DEFAULT_GOAL := help
 NEWEST := .venv-newest
 OLDEST := .venv-oldest
-PLANNER := tests/planner
+INSTALL := bin/python -m pip --disable-pip-version-check install --quiet
+
+# $(call chosen,NAMES): the PYTHON that the user names, else the first of these that runs, else python3
+chosen = $(if $(filter file,$(origin PYTHON)),$(shell \
+    for name in $(1); do $$name -c '' 2>/dev/null && echo $$name && exit; done; echo $(PYTHON)),$(PYTHON))
 
 .PHONY: help demo test learn slow newest oldest lint types check picture perf soak study docs bodies beads clean
 
@@ -52,18 +56,20 @@ learn: $(VENV)/.learned ## install torch and Stable-Baselines3 too, run the test
 slow: $(VENV)/.developed ## run the long tests too, on newly drawn values
 	@$(BIN)/python -m pytest --hypothesis-profile=default -n 2 --dist loadfile
 
-newest: ## the planner's and the judge's tests with the newest of all it needs, without a simulator
-	@test -x $(NEWEST)/bin/python || $(PYTHON) -m venv $(NEWEST)
-	@$(PYTHON) .ci/requirements.py newest > $(NEWEST)/requirements.txt
-	@$(NEWEST)/bin/python -m pip --disable-pip-version-check install --quiet --upgrade --requirement $(NEWEST)/requirements.txt
-	@$(NEWEST)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --editable .
-	@$(NEWEST)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile $(PLANNER)
+newest: ## the planner's and the judge's tests with the newest of all they need, no simulator; PYTHON=python3.13
+	@test -x $(NEWEST)/bin/python || $(call chosen,python3.13 python3.12) -m venv $(NEWEST)
+	@$(NEWEST)/bin/python .ci/requirements.py newest > $(NEWEST)/requirements.txt
+	@echo "installing into $(NEWEST) (some minutes)"
+	@$(NEWEST)/$(INSTALL) --upgrade --requirement $(NEWEST)/requirements.txt
+	@$(NEWEST)/$(INSTALL) --no-deps --ignore-requires-python --editable .
+	@$(NEWEST)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile tests/planner
 
-oldest: ## the tests with the lowest allowed version of all that is needed; PYTHON=python3.10
-	@test -x $(OLDEST)/bin/python || $(PYTHON) -m venv $(OLDEST)
-	@$(PYTHON) .ci/requirements.py oldest > $(OLDEST)/requirements.txt
-	@$(OLDEST)/bin/python -m pip --disable-pip-version-check install --quiet --requirement $(OLDEST)/requirements.txt
-	@$(OLDEST)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --editable .
+oldest: ## the tests with the lowest version that is allowed of all they need; PYTHON=python3.10
+	@test -x $(OLDEST)/bin/python || sh .ci/prerequisites $(call chosen,python3.10)
+	@test -x $(OLDEST)/bin/python || $(call chosen,python3.10) -m venv $(OLDEST)
+	@$(OLDEST)/bin/python .ci/requirements.py oldest > $(OLDEST)/constraints.txt
+	@echo "installing into $(OLDEST) (some minutes)"
+	@$(OLDEST)/$(INSTALL) --editable '.[dev]' --constraint $(OLDEST)/constraints.txt
 	@$(OLDEST)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile
 
 lint: $(VENV)/.developed ## ruff
