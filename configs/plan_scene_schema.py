@@ -143,7 +143,13 @@ class RobotFile(Strict):
     mjcf: str | None = None
     tool: str | None = None
     tcp_frame: str | None = None
-    velocity_limits: list[float] | None = None
+    velocity_limits: (
+        Annotated[
+            Annotated[float, Tag("~table")] | Annotated[list[float], Tag("~list")],
+            _either("a number, or a list of one per joint"),
+        ]
+        | None
+    ) = None
     base: Placed | None = None
     base_link: str | None = None
     locked: dict[str, float] = Field(default_factory=dict)
@@ -190,7 +196,8 @@ class SceneConfig(Strict):
         goal: goal pose of the tcp, as a pose vector or a table.
         obstacles: obstacles in the world.
         held: object in the hand, or None.
-        allowed: pairs of a part of the body (or a held object) and an obstacle that may touch.
+        allowed: pairs of a part of the body (or a held object) and an obstacle that may touch, but for 5 mm no deeper than
+            at the ends of the motion.
         settings: settings of the planner, nested; see `PlanSettings`.
         seed: seed of the planner's random choices.
     """

@@ -171,12 +171,14 @@ def _robot(scene: PlanScene) -> tuple[Arm, Body, np.ndarray]:
 
 
 def _robot_of_file(scene: PlanScene, robot: RobotFile) -> tuple[Arm, Body, np.ndarray]:
-    speeds, folders = robot.velocity_limits, robot.package_dirs
+    folders = robot.package_dirs
+    with scene.blaming("robot.base"):
+        base = None if robot.base is None else pose_of(robot.base)
     request = RobotRequest(
         scene.file(robot.urdf or robot.mjcf or ""),
-        robot.tool or robot.tcp_frame,
-        velocity_limits=speeds[0] if speeds is not None and len(speeds) == 1 else speeds,
-        base=None if robot.base is None else pose_of(robot.base),
+        robot.tool if robot.tcp_frame is None else robot.tcp_frame,
+        velocity_limits=robot.velocity_limits,
+        base=base,
         base_link=robot.base_link,
         locked=robot.locked,
         package_dirs=None if folders is None else [scene.file(folder) for folder in folders],
@@ -218,6 +220,9 @@ def _lines(planned: ScenePlan, certificate: Certificate | None) -> Iterator[tupl
     seconds = plan.dt * (len(plan.joints) - 1)
     yield "found     ", "green", f"{name}: {_how(plan)}, {spent}; the motion takes {seconds:.1f} s"
     yield "clearance ", "", _clearance(planned, certificate)
+    if certificate is not None and plan.request.allowed:
+        deeper = f"{1e3 * certificate.contact_excess:.1f} mm"
+        yield "contacts  ", "", f"on the way at most {deeper} deeper than at the ends, where allowed"
     yield "joints    ", "", f"{plan.margin:.2f} rad from a limit at the least; {_pace(planned)}"
     if certificate is None:
         yield "not judged", "yellow", "see --certify"

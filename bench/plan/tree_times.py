@@ -58,7 +58,7 @@ def expand_loop(g, tree, goal, cells, options, state, repeats):
 
     Args:
         g: work array of the tool and the obstacles.
-        tree: (n, TREE_WIDTH) nodes, the root first.
+        tree: (n, NODE.width) nodes, the root first.
         goal: (1, 8) dual quaternion.
         cells: (m,) cell table, cleared before every expansion.
         options: packed `RepetSettings`.

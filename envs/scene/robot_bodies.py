@@ -39,7 +39,7 @@ def robot_body(robot: Robot, index: int = 0) -> Body:
     """Return the capsules of a robot's arm at the table, including its hand and the full range of the fingers.
 
     Args:
-        robot: of `ROBOTS`.
+        robot: one of `ROBOTS`.
         index: index of the arm.
 
     Raises:
@@ -56,6 +56,7 @@ def robot_body(robot: Robot, index: int = 0) -> Body:
         tuple(entry["names"]),
         hulls=tuple(None if k < 0 else hulls[k] for k in entry.get("hull_of", ())),
         pairs=None if pairs is None else tuple((i, j) for i, j in pairs),
+        margins={(i, j): margin for i, j, margin in entry.get("margins", ())},
     )
 
 
@@ -74,6 +75,8 @@ def _entry(body: Body) -> dict[str, Any]:
         entry["hull_of"] = [-1 if hull is None else place[id(hull)] for hull in body.hulls]
     if body.pairs is not None:
         entry["pairs"] = [list(pair) for pair in body.pairs]
+    if body.margins:
+        entry["margins"] = [[i, j, margin] for (i, j), margin in body.margins.items()]
     return entry
 
 
@@ -84,7 +87,8 @@ def _rounded(body: Body) -> Body:
     # corners move like the ends, so their rounding grows by as much
     rounded = {id(hull): _rounded_hull(hull) for hull in body.hulls if hull is not None}
     hulls = tuple(None if hull is None else rounded[id(hull)] for hull in body.hulls)
-    return Body(rows, body.names, hulls=hulls, pairs=body.pairs)
+    margins = {pair: float(np.floor(margin * 10**DIGITS) / 10**DIGITS) for pair, margin in body.margins.items()}
+    return Body(rows, body.names, hulls=hulls, pairs=body.pairs, margins=margins)
 
 
 def _rounded_hull(hull: Hull) -> Hull:

@@ -11,7 +11,7 @@ from ..jit import inlined, inner, kernel
 from .capsule_placement import end_a, end_b, may_touch, place_capsules
 from .hull_distance import asks_hull, asks_hulls, obstacle_hull_distance, pair_hull_distance
 from .proximity import FAR, between_segments, closest, distance, is_beyond
-from .robot_arrays import ARM_ENTRY, CAPSULE, HEADER, NEAR_PAIR, PAIR, PLACED, ROW, SETTING
+from .robot_arrays import ARM_ENTRY, CAPSULE, HEADER, NEAR_PAIR, PAIR, PLACED, ROW
 
 
 @inlined
@@ -129,9 +129,9 @@ def min_slack(g, world, seconds, cutoff):
                 if slack < least and asks_hull(g, c, slack):
                     slack = max(slack, hull_distance(g, world, c, k, seconds, least + margin) - margin)
                 least = min(least, slack)
-    first, margin = int(g[ROW.header, HEADER.first_pair]), g[ROW.settings, SETTING.self_margin]
+    first = int(g[ROW.header, HEADER.first_pair])
     for p in range(first, first + int(g[ROW.header, HEADER.pairs])):
-        i, j = int(g[p, PAIR.first]), int(g[p, PAIR.second])
+        i, j, margin = int(g[p, PAIR.first]), int(g[p, PAIR.second]), g[p, PAIR.margin]
         slack = capsule_distance(g, world, i, j) - margin
         if slack < least and asks_hulls(g, i, j, slack):
             slack = max(slack, pair_hull_distance(g, world, i, j, least + margin)[0] - margin)
@@ -204,9 +204,9 @@ def find_near(g, shell):
                     distance = further
                     _note_hulls(g, row, distance, normal, p, p)
             least, row = min(least, distance - margin), row + 1
-    pair, margin = int(g[ROW.header, HEADER.first_pair]), g[ROW.settings, SETTING.self_margin]
+    pair = int(g[ROW.header, HEADER.first_pair])
     for p in range(pair, pair + int(g[ROW.header, HEADER.pairs])):
-        i, j = int(g[p, PAIR.first]), int(g[p, PAIR.second])
+        i, j, margin = int(g[p, PAIR.first]), int(g[p, PAIR.second]), g[p, PAIR.margin]
         one, other = ROW.placed + i, ROW.placed + j
         distance, t, s, normal = between_segments(end_a(g, one), end_b(g, one), end_a(g, other), end_b(g, other))
         distance -= g[ROW.body + i, CAPSULE.radius] + g[ROW.body + j, CAPSULE.radius]

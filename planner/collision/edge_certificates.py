@@ -203,7 +203,7 @@ def point_speeds(g, twist):
 
 @kernel
 def longest_displacement(g, x, y):
-    """Return the longest displacement [m] of any point of the tool along the screw between two poses.
+    """Return the longest displacement [m] of any point of a core or hull of the tool along the screw between two poses.
 
     Args:
         g: array of the tool, see `tool_arrays`.

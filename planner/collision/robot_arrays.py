@@ -86,7 +86,7 @@ class SettingColumns(NamedTuple):
     decay: int = 6
     halvings: int = 7
     slew: int = 8  # largest change of a joint's speed from one command to the next [rad/s]
-    self_margin: int = 9  # distance [m] to keep between capsules of the robot
+    self_margin: int = 9  # most [m] that any pair of the robot's own capsules is asked to keep, see PAIR
     width: int = 10
 
 
@@ -127,7 +127,7 @@ class PlacedColumns(NamedTuple):
     a: int = 0  # one end of the core (3) [m]
     b: int = 3  # the other end (3) [m]
     center: int = 6  # middle of the core (3) [m]
-    reach: int = 9  # longest displacement [m] of any point of the capsule during a step
+    reach: int = 9  # longest displacement [m] of any point of the core during a step
     all_center: int = 10  # center (3) [m] of a ball that contains all capsules that move
     all_radius: int = 13  # its radius [m]
     origin: int = 14  # origin (3) [m] of the frame, of a capsule with a hull
@@ -140,6 +140,7 @@ class PairColumns(NamedTuple):
 
     first: int = 0
     second: int = 1
+    margin: int = 2  # distance to keep [m]
 
 
 class NearPairColumns(NamedTuple):
@@ -206,9 +207,19 @@ def robot_arrays(
     work[ROW.posed] = np.nan
     if len(pairs):
         work[ROW.obstacles :, PAIR.first : PAIR.second + 1] = pairs
+        work[ROW.obstacles :, PAIR.margin] = _pair_margins(bodies, pairs, work[ROW.settings, SETTING.self_margin])
     _lay_arms(work, arms, bodies)
     hulls = [hull for body in bodies for hull in body.hulls or [None] * len(body)]
     return with_obstacles(with_hulls(work, hulls), packed, masks, margin)
+
+
+def _pair_margins(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], usual: float) -> list[float]:
+    """The distance [m] that each pair of capsules, counted through all bodies, keeps."""
+    least, first = {}, 0
+    for body in bodies:
+        least.update({(first + i, first + j): margin for (i, j), margin in body.margins.items()})
+        first += len(body)
+    return [min(usual, least.get((int(i), int(j)), usual)) for i, j in pairs]
 
 
 def with_hulls(robot: np.ndarray, hulls: Sequence[Hull | None]) -> np.ndarray:

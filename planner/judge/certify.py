@@ -16,6 +16,7 @@ import numpy as np
 
 from ..log.motion_log import PROBLEM, MotionLog, content_of, digest_of
 from ..robot.body import BODY
+from .contacts import contact_excess
 from .deviation import deviation_of
 from .sweep import Sweep, Sweeper, SweepSettings
 
@@ -26,6 +27,8 @@ SPEED_EXCESS = 1e-6
 """Relative tolerance of joint speeds, for rounding."""
 CLAIM_GAP = 1e-5
 """Tolerance [m] in proving a claimed clearance: the last micrometers take too many halvings."""
+CONTACT_ROOM = 0.006
+"""Distance [m] by which an allowed contact may be deeper on the way than at the ends of the motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,8 @@ class Certificate:
         deviation: largest weighted distance of the motion's end to the demonstrated path [m] (see `deviation`), both
             traversed in order; None: no path.
         deviation_gap: the true deviation is smaller by at most this [m].
+        contact_excess: how much deeper [m] the motion is in any allowed contact than at its deeper end: an upper bound,
+            also between samples; 0 without allowed contacts.
         intervals: number of examined pairs of a capsule and an obstacle over an interval.
         log_sha256: digest of the log.
     """
@@ -61,6 +66,7 @@ class Certificate:
     angle_error: float | None
     deviation: float | None
     deviation_gap: float
+    contact_excess: float
     intervals: int
     log_sha256: str
 
@@ -93,14 +99,15 @@ def certify(
     Returns:
         The findings, in every case: a rejected motion is not an error.
     """
-    required = _required(log)
+    settings, required = settings or SweepSettings(), _required(log)
     claimed = log.claims.get("clearance", -math.inf)
-    sweeper = Sweeper(log, required - tolerance, claimed - 0.5 * CLAIM_GAP, settings or SweepSettings())
+    sweeper = Sweeper(log, required - tolerance, claimed - 0.5 * CLAIM_GAP, settings)
     sweep = sweeper.run()
     errors = _goal_errors(log, sweeper.moment.tool[-1])
     deviation, gap = None, 0.0
     if log.demonstrated is not None:
         deviation, gap = deviation_of(sweeper.kinematics, log)
+    excess, contacts = contact_excess(log, _allowed(log), _margins(log), CONTACT_ROOM, settings)
     margins = np.minimum(log.joints - log.arm.lower, log.arm.upper - log.joints)
     checked = np.isfinite(required)
     certificate = Certificate(
@@ -115,6 +122,7 @@ def certify(
         angle_error=errors[1],
         deviation=deviation,
         deviation_gap=gap,
+        contact_excess=float(excess.max(initial=0.0)),
         intervals=sweep.intervals,
         log_sha256=digest_of(log),
     )
@@ -122,6 +130,7 @@ def certify(
         *_problem_reasons(log, expected),
         *_motion_reasons(log, margins),
         *_clearance_reasons(log, sweep, required, tolerance),
+        *_contact_reasons(log, contacts, excess, tolerance),
         *_goal_reasons(log, certificate, tolerance),
         *_claim_reasons(log, certificate, tolerance),
     )
@@ -134,14 +143,20 @@ def _required(log: MotionLog) -> np.ndarray:
 
     The base cannot run into a standing obstacle: its place is not part of a motion.
     """
-    margins = [log.safety if o.margin is None else o.margin for o in log.obstacles]
-    out = np.tile(np.array(margins, dtype=np.float64), (len(log.body), 1))
-    for k, mine in enumerate(log.body.names):
-        for o, obstacle in enumerate(log.obstacles):
-            fixed = log.body.rows[k, BODY.frame] < 0 and not obstacle.velocity.any()
-            if fixed or (mine, obstacle.name) in log.allowed:
-                out[k, o] = -math.inf
-    return out
+    fixed = log.body.rows[:, BODY.frame] < 0
+    standing = np.array([not obstacle.velocity.any() for obstacle in log.obstacles], dtype=bool)
+    return np.where(_allowed(log) | (fixed[:, None] & standing), -math.inf, _margins(log))
+
+
+def _margins(log: MotionLog) -> np.ndarray:
+    """Return the distances (k,) [m] to keep from the obstacles."""
+    return np.array([log.safety if o.margin is None else o.margin for o in log.obstacles], dtype=np.float64)
+
+
+def _allowed(log: MotionLog) -> np.ndarray:
+    """Return which capsules may touch which obstacles (m, k)."""
+    pairs = [[(mine, o.name) in log.allowed for o in log.obstacles] for mine in log.body.names]
+    return np.array(pairs, dtype=bool).reshape(len(log.body), len(log.obstacles))
 
 
 def _smallest(values: np.ndarray) -> float:
@@ -207,6 +222,18 @@ def _clearance_reasons(log: MotionLog, sweep: Sweep, required: np.ndarray, toler
             what = f"at least {-found:.4g} m inside" if found < 0 else state
             where = f"{log.obstacles[o].name or f'obstacle {o}'} at {sweep.when[k, o]:.4g} s"
             yield f"clearance: {name} is {what} {where}; {required[k, o]:g} m must be kept"
+
+
+def _contact_reasons(log: MotionLog, sweep: Sweep, excess: np.ndarray, tolerance: float) -> Iterator[str]:
+    if not sweep.complete:
+        yield f"contacts: undecided after {sweep.intervals} intervals"
+    for o in np.flatnonzero(excess > CONTACT_ROOM + tolerance):
+        k = int(sweep.certified[:, o].argmin())
+        where = f"{log.obstacles[o].name} at {sweep.when[k, o]:.4g} s"
+        yield (
+            f"contacts: {log.body.names[k]} is up to {excess[o]:.4g} m deeper in {where} than at the motion's ends; "
+            f"at most {CONTACT_ROOM:g} m"
+        )
 
 
 def _goal_reasons(log: MotionLog, found: Certificate, tolerance: float) -> Iterator[str]:

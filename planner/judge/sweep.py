@@ -155,6 +155,14 @@ class Sweeper:
             stack += self._halved(batch)
         return self.found
 
+    def smallest(self, which: np.ndarray) -> np.ndarray:
+        """Return the smallest distances (m, k) [m] at the samples, of pairs that a mask (m, k) selects; else inf."""
+        out, pairs = np.full(which.shape, np.inf), np.argwhere(which)
+        for n in range(len(self.moment.time)):
+            cells = np.column_stack([np.full(len(pairs), n), pairs])
+            out[which] = np.minimum(out[which], self._scene.distances(self.moment, cells))
+        return out
+
     def _swing(self, k: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Bound the displacement (c,) [m] of points of the hulls of capsules k beyond that of their cores.
 

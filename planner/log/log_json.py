@@ -48,6 +48,8 @@ def content_of_body(body: Body) -> dict[str, Any]:
         table["hull_of"] = [-1 if hull is None else place[id(hull)] for hull in body.hulls]
     if body.pairs is not None:
         table["pairs"] = [list(pair) for pair in body.pairs]
+    if body.margins:
+        table["margins"] = [[i, j, margin] for (i, j), margin in body.margins.items()]
     return table
 
 
@@ -120,7 +122,7 @@ def body_of(value: Any) -> Body:
     Raises:
         Refused: anything else.
     """
-    keys = [key for key in ("hulls", "hull_of", "pairs") if isinstance(value, dict) and key in value]
+    keys = [key for key in ("hulls", "hull_of", "pairs", "margins") if isinstance(value, dict) and key in value]
     table = table_of("body", value, ("rows", "names", "held", *keys))
     names = texts_of("body.names", table["names"])
     pairs = None
@@ -133,6 +135,7 @@ def body_of(value: Any) -> Body:
             texts_of("body.held", table["held"]),
             _hulls(table, len(names)),
             pairs,
+            _margins(table),
         )
 
 
@@ -150,6 +153,15 @@ def _hulls(table: dict[str, Any], count: int) -> tuple[Hull | None, ...]:
     if len(places) and not (places.min() >= -1 and places.max() < len(known)):
         raise Refused("body.hull_of", f"holds a number that is not from -1 to {len(known) - 1}")
     return tuple([*known, None][k] for k in places)
+
+
+def _margins(table: dict[str, Any]) -> dict[tuple[int, int], float]:
+    """The margins of some pairs of a body's capsules; {} without any."""
+    if "margins" not in table:
+        return {}
+    rows = numbers_of("body.margins", table["margins"], (None, 3))
+    pairs = _whole("body.margins", rows[:, :2].tolist(), (None, 2))
+    return {(int(i), int(j)): float(margin) for (i, j), margin in zip(pairs, rows[:, 2], strict=True)}
 
 
 def _whole(key: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:

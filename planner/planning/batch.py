@@ -17,7 +17,7 @@ from .settings import PlanSettings
 def plan_batch(
     requests: Sequence[PlanRequest], arm: Arm, body: Body, settings: PlanSettings | None = None, *, workers: int = 2
 ) -> list[Plan]:
-    """Answer many requests on several cores; the plans are the same as one by one.
+    """Answer many requests on several cores; the plans equal those of answering one by one.
 
     Args:
         requests: the motions to plan.

@@ -5,6 +5,7 @@ Not in the paper, whose goals are poses of the end effector.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -127,7 +128,8 @@ def tool_path(arm: Arm, joints: np.ndarray) -> np.ndarray:
         arm: the arm.
         joints: (t, dof) at every tick.
     """
-    rows = np.vstack([joints[: -1 : max(1, len(joints) // MOST_POSES)], joints[-1]])
+    before = joints[:-1]
+    rows = np.vstack([before[:: max(1, math.ceil(len(before) / MOST_POSES))], joints[-1]])
     poses, frames = np.empty((len(rows), 8)), np.empty((arm.dof, FRAME.width))
     for q, pose in zip(rows, poses, strict=True):
         forward_into(arm.chain, q, frames, pose)

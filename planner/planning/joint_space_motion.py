@@ -36,6 +36,7 @@ RAMP = 0.3
 
 
 IK_OR_LIMIT, NO_CLEAR_POSTURE, NO_JOINT_PATH = "ik_or_limit", "no clear posture", "no path in joint space"
+DEEP_CONTACT = "an allowed contact is deeper on the way"
 """Reasons of a failed search: no posture, or none from which the rest of the path can be followed; every posture is in
 collision; no path leads to a posture."""
 
@@ -62,7 +63,7 @@ class SearchFailure(NamedTuple):
     """A search without success.
 
     Attributes:
-        reason: IK_OR_LIMIT, NO_CLEAR_POSTURE or NO_JOINT_PATH.
+        reason: IK_OR_LIMIT, NO_CLEAR_POSTURE, NO_JOINT_PATH or DEEP_CONTACT.
         detail: the facts of this case; "" if there is no more to say.
     """
 
@@ -182,6 +183,9 @@ def plan_joint_space(
             points, posture = best
             timed_joints = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
             joints = np.vstack([timed_joints[:-1], posture.tail])
+            if not scene.keeps_contacts(joints):
+                failure = SearchFailure(DEEP_CONTACT, "on the way to the path")
+                continue
             margin = min(arm.margin(row) for row in joints)
             return JointSpaceMotion(joints, posture.path, posture.guide, margin, posture.next_feasible)
     return failure
@@ -199,7 +203,7 @@ def _postures(
 
     And the failure that it would be if no path led to any of them.
     """
-    search, found, collision, clear = settings.search, [], None, 0
+    search, found, collision, clear, deep = settings.search, [], None, 0, False
     imitated = imitated_path(demonstrated, goal)
     first, last = guide_index(imitated, settings.motion.guide), len(imitated) - 1
     home, (low, high) = np.clip(q, arm.lower, arm.upper), sample_ranges(arm.lower, arm.upper, q)
@@ -220,6 +224,9 @@ def _postures(
             tail, margin = _followed(scene, work, path, solution, settings)
             if tail is None:
                 continue
+            if not scene.keeps_contacts(np.vstack([q, tail])):
+                deep = True
+                continue
             cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
             cost += search.late * (index - first) / max(last - first, 1)
             next_feasible = check is None or check.is_feasible(arm, work, tail[-1], settings)
@@ -227,13 +234,15 @@ def _postures(
                 assert check is not None
                 cost += INFEASIBLE_COST if check.required else 5.0
             found.append(_Posture(cost, len(found), solution, tail, path, index, next_feasible))
-    return found, _failure(scene, len(found), clear, collision)
+    return found, _failure(scene, len(found), clear, collision, deep)
 
 
-def _failure(scene: PlanningScene, found: int, clear: int, collision: np.ndarray | None) -> SearchFailure:
+def _failure(scene: PlanningScene, found: int, clear: int, collision: np.ndarray | None, deep: bool) -> SearchFailure:
     """Return why no path leads to a goal that `found` postures were found for, of `clear` that are in no collision."""
     if found:
         return SearchFailure(NO_JOINT_PATH, f"none leads to any of {found} postures")
+    if deep:
+        return SearchFailure(DEEP_CONTACT, "the rest of the path leads through what it may touch at its ends")
     if clear:
         return SearchFailure(IK_OR_LIMIT, f"the rest of the path cannot be followed from any of {clear} postures")
     if collision is not None:

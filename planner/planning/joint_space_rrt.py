@@ -1,6 +1,6 @@
 """Compiled search in joint space (RRT-Connect, Kuffner and LaValle 2000) with edges that are proven clear.
 
-For what a tool's detour cannot solve: the hand's way is free, but the arm's is not. Not in the paper.
+It finds motions where the tool has a clear path, but the arm cannot follow it. Not in the paper.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import numpy as np
 from ..collision.capsule_placement import may_touch, place_capsules
 from ..collision.clearance import all_beyond, capsule_distance, hull_distance, obstacle_distance, slack_at
 from ..collision.hull_distance import asks_hull, asks_hulls, pair_hull_distance
-from ..collision.robot_arrays import CAPSULE, HEADER, MAX_JOINTS, PAIR, PLACED, ROW, SETTING
+from ..collision.robot_arrays import CAPSULE, HEADER, MAX_JOINTS, PAIR, PLACED, ROW
 from ..collision.step_certificates import bound_motion
 from ..escape.tangent_plane import random_number
 from ..geometry.shapes import OBSTACLE
 from ..jit import inlined, inner, kernel
 
 SMALLEST = 1e-4
-"""Way [m] below which a stretch that cannot be proven is held to be blocked."""
+"""Length [m] below which a stretch that cannot be proven counts as blocked."""
 
 
 @inner
@@ -48,14 +48,13 @@ def _clear_stretch(g):
                 stretch = min(stretch, part)
     first = int(g[ROW.header, HEADER.first_pair])
     for p in range(first, first + int(g[ROW.header, HEADER.pairs])):
-        i, j = int(g[p, PAIR.first]), int(g[p, PAIR.second])
+        i, j, margin = int(g[p, PAIR.first]), int(g[p, PAIR.second]), g[p, PAIR.margin]
         displacement = g[ROW.placed + i, PLACED.reach] + g[ROW.placed + j, PLACED.reach]
-        slack = capsule_distance(g, ROW.placed, i, j) - g[ROW.settings, SETTING.self_margin]
+        slack = capsule_distance(g, ROW.placed, i, j) - margin
         if slack >= stretch * displacement:
             continue
         part = _share(slack, displacement)
         if asks_hulls(g, i, j, slack):
-            margin = g[ROW.settings, SETTING.self_margin]
             displacement += g[ROW.placed + i, PLACED.swing] + g[ROW.placed + j, PLACED.swing]
             slack = pair_hull_distance(g, ROW.placed, i, j, margin + stretch * displacement)[0] - margin
             part = max(part, _share(slack, displacement))
@@ -83,7 +82,7 @@ def joint_edge_is_clear(g, start, end):
         end: (n,) joints.
     """
     n, part, at = len(start), g[ROW.part], g[ROW.after]
-    for s in (1.0, 0.5, 0.25, 0.75):  # what is blocked is mostly seen at once
+    for s in (1.0, 0.5, 0.25, 0.75):  # a blocked edge is mostly refused at once
         for i in range(n):
             at[i] = start[i] + s * (end[i] - start[i])
         if slack_at(g, at[:n], 0.0, 0.1) < 0.0:
@@ -149,7 +148,7 @@ def _extend(g, tree, parents, count, q, step, greedy):
 
 @inner
 def _read_branch(tree, parents, row, out, at, back, n):
-    """Write the branch of a node into `out` from row `at` on, from the root or back to it; the next free row."""
+    """Write the branch of a node into `out` from row `at` on, from the root or back to it; returns the next row."""
     count, k = 0, row
     while k >= 0:
         count, k = count + 1, int(parents[k])
@@ -195,18 +194,18 @@ def sample_ranges(lower: np.ndarray, upper: np.ndarray, around: np.ndarray) -> t
 
 @kernel
 def connect(g, start, goal, trees, parents, step, iterations, state, out):
-    """A clear path in joint space from start to goal, the number of its points; 0 if none was found.
+    """Search a clear path in joint space; returns the number of its points, 0 if none was found.
 
     Args:
         g: the robot among obstacles, see `robot_arrays`.
-        start: (n,) joints.
-        goal: (n,) joints.
+        start: (n,) joints [rad or m], the first point.
+        goal: (n,) joints, the last point.
         trees: (2, m, n) scratch.
         parents: (2, m) scratch.
-        step: longest edge [rad].
-        iterations: most samples.
+        step: length of the longest edge [rad or m].
+        iterations: largest number of samples.
         state: (1,) of the random numbers.
-        out: (>= 2 m, n) result.
+        out: (>= 2 m, n) points of the path, the result.
     """
     n = len(start)
     for i in range(n):
@@ -234,7 +233,7 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
         counts = _changed(counts, b, count)
         if met:
             at = _read_branch(trees[0], parents[0], counts[0] - 1, out, 0, False, n)
-            # the two trees share the point at which they have met
+            # the two trees share the point where they meet
             return _read_branch(trees[1], parents[1], counts[1] - 1, out, at - 1, True, n)
     return 0
 
@@ -259,13 +258,13 @@ def _moved(path, first, count, to):
 
 @kernel
 def shortcut(g, path, count, tries, state, ends):
-    """Put clear straight lines in place of stretches of a joint path (count, n), from anywhere to anywhere on it.
+    """Replace stretches of a joint path by clear straight lines between random points of the path.
 
     Args:
         g: the robot among obstacles, see `robot_arrays`.
-        path: (m, n), the first `count` rows are the path; changed.
+        path: (m, n) joints, the path in the first `count` rows; changed in place.
         count: number of its points.
-        tries: lines to try.
+        tries: number of lines to try.
         state: (1,) of the random numbers.
         ends: (2, n) scratch.
 

@@ -17,6 +17,7 @@ search in joint space was the last to fail, the reason is the search's.
 | ik_or_limit | the arm does not follow any path of the tool to its end | how far it reaches, or comes |
 | no clear posture | all postures that a search in joint space found are in collision | part, obstacle, distance |
 | no path in joint space | a search in joint space found postures, but no path | number of postures |
+| an allowed contact is deeper on the way | than at the motion's ends, by more than 5 mm | |
 | no path to the goal joints | neither the tool's path nor a search in joint space leads there | number of searches |
 """
 
@@ -74,8 +75,8 @@ class PlanRequest(NamedTuple):
         start: (dof,) joints now.
         goal: pose of the tcp at the end, or (dof,) joints at the end.
         obstacles: as they are now; they are taken to stand still.
-        allowed: pairs of names (part of the body or held object, obstacle) that may touch along the imitated path; a
-            search in joint space, or a detour, goes no deeper than the motion's ends.
+        allowed: pairs of names (part of the body or held object, obstacle) that may touch, but for 5 mm no deeper than
+            at the motion's ends.
         leaving: path of the tcp from its pose at `start` on, by which the start is left; None: blend at once.
         next_motion: the motion that follows, if it is known.
         seed: of all random choices; the same seed gives the same plan.

@@ -31,7 +31,14 @@ from ..robot.kinematics import FRAME, forward_into
 from .attempts import Attempt, attempts
 from .closed_loop_motion import COUNT, Buffers, buffers, plan_closed_loop
 from .joint_goal import line_to, plan_to_joints, tool_path
-from .joint_space_motion import IK_OR_LIMIT, NextMotionCheck, SearchFailure, path_deviation, plan_joint_space
+from .joint_space_motion import (
+    DEEP_CONTACT,
+    IK_OR_LIMIT,
+    NextMotionCheck,
+    SearchFailure,
+    path_deviation,
+    plan_joint_space,
+)
 from .plan import WHY, MotionPlanner, Plan, PlanRequest
 from .planning_scene import PlanningScene, SceneTemplate
 from .requests import checked_request, reduced_request, unfit
@@ -132,8 +139,8 @@ class Planner(MotionPlanner):
             status, pursuit, margin = self._closed_loop(run, lead, attempt, seed)
             escapes.append(status)
             trace = self._buffers.trace[: self._buffers.counts[COUNT.last] + 1]
-            kept = status != ESCAPED or run.scene.keeps_contacts(trace)  # a detour is no wanted contact
-            if pursuit == ARRIVED and self._is_straight() and kept:
+            arrived = pursuit == ARRIVED and self._is_straight()
+            if arrived and run.scene.keeps_contacts(trace):
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
                 found = found._replace(next_feasible=self._next_is_feasible(run, found.joints[-1]))
@@ -141,7 +148,7 @@ class Planner(MotionPlanner):
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
             elif failed is None:
-                reason = WHY.get(status, "") or IK_OR_LIMIT
+                reason = DEEP_CONTACT if arrived else WHY.get(status, "") or IK_OR_LIMIT
                 failed = reason, self._detail(run, status, attempt.factor)
         if best is None:
             assert failed is not None
@@ -215,12 +222,8 @@ class Planner(MotionPlanner):
         return plan._replace(margin=float(margins.min()), next_feasible=self._next_is_feasible(run, plan.joints[-1]))
 
     def _is_good(self, plan: Plan) -> bool:
-        settings = self.settings
-        return (
-            plan.imitated_share >= settings.min_imitated_share
-            and plan.end_margin >= settings.end_margin
-            and plan.next_feasible
-        )
+        share, margin = self.settings.min_imitated_share, self.settings.end_margin
+        return plan.imitated_share >= share and plan.end_margin >= margin and plan.next_feasible
 
     def _is_straight(self) -> bool:
         """True if the tool has stayed within `max_deviation` of the path that it followed."""
@@ -315,7 +318,7 @@ class Planner(MotionPlanner):
         )
 
     def _made(self, run: _Run, **found: Any) -> Plan:
-        """A plan with what is the same for all of this planner."""
+        """Return a plan of the given values and of those that all plans of this planner share."""
         empty = {"reason": "", "how": "", "tree_rows": self._buffers.tree[:0], "detours": 0, "changed": 0}
         same = {"arm": self.arm, "body": self.body, "settings": self.settings, "dt": self.settings.motion.dt}
         return Plan(**{**empty, **same, "request": run.request, "tries": 0, "seconds": 0.0, **found})

@@ -246,7 +246,7 @@ class PlanningScene:
         return self.robot_distance / self._distance if self._distance > 0 else 1.0
 
     def tightest(self, q: np.ndarray) -> Tightest | None:
-        """Return the whole arm's pair with the least slack at joints q (dof,); None if no pair is within its margin."""
+        """Return the whole arm's pair with the least slack at joints q (dof,); None beyond the largest margin."""
         place_capsules(self.seen, self._template.arm.checked(q), ROW.placed)
         return self._tightest(self.seen, self._template.names)
 

@@ -44,7 +44,7 @@ def smoothed(plan: Plan, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
         WrongType: no plan.
         BadOption: the tolerance is negative or not a number.
         PlanFailed: "plan_failed": the plan failed, it leads through joint space or to given joints, or the curve is not
-            clear or not followed to its end.
+            clear, not followed to its end, or deeper in an allowed contact than at its ends.
     """
     check_success(plan, "make smooth")
     check_range("tolerance", tolerance, "[0, inf]")
@@ -64,6 +64,7 @@ def smoothed(plan: Plan, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
     )
     if status != ARRIVED:
         raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * motion.dt:.2f} s")
+    _check_contacts(scene, trace[: last + 1])
     return plan._replace(
         joints=trace[: last + 1].copy(),
         path_poses=curve.dqs,
@@ -91,14 +92,22 @@ def timed(plan: Plan, acceleration_limits: ArrayLike = ACCELERATION) -> Plan:
 
     Raises:
         WrongType, BadShape, BadOption: no plan, or limits that are not (dof,) positive numbers.
-        PlanFailed: "plan_failed": the plan failed, or the spline between its points is not clear.
+        PlanFailed: "plan_failed": the plan failed, the spline between its points is not clear, or it goes deeper into
+            an allowed contact than at its ends.
     """
     check_success(plan, "time")
     result = time_optimal(plan.joints, plan.arm.velocity_limits, acceleration_limits, plan.dt)
-    check_joints_are_clear(result.joints, result.time, scene_of(plan))
+    scene = scene_of(plan)
+    check_joints_are_clear(result.joints, result.time, scene)
+    _check_contacts(scene, result.joints)
     margin = min(plan.arm.margin(q) for q in result.joints)
     # a timed motion is no closed loop any more
     return plan._replace(joints=result.joints, margin=margin, changed=0, refined=(*plan.refined, "timed"))
+
+
+def _check_contacts(scene: PlanningScene, joints: np.ndarray) -> None:
+    if not scene.keeps_contacts(joints):
+        raise PlanFailed("plan_failed", "the refined motion goes deeper into an allowed contact than at its ends")
 
 
 def refused(plan: Plan, failure: PlanFailed) -> Plan:

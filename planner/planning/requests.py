@@ -12,6 +12,7 @@ from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
 from ..imitation.reduction import reduced
 from ..ranges import check_count
 from ..robot.arm import Arm
+from ..safety.robot_checks import checked_contacts
 from .joint_goal import beyond_limit, checked_goal
 from .plan import NextMotion, PlanRequest
 from .planning_scene import PlanningScene, checked_obstacles
@@ -24,7 +25,7 @@ LEAVING_TOLERANCE = 0.01
 
 
 def checked_request(request: PlanRequest, arm: Arm) -> PlanRequest:
-    """Return a request that can be planned: its start, and a goal of joints, as arrays of their own.
+    """Return a request that can be planned: its start, and a goal of joints, as arrays of their own, its seed an int.
 
     Joints that are beyond a limit by no more than `ROUNDING` are at the limit.
 
@@ -44,13 +45,17 @@ def checked_request(request: PlanRequest, arm: Arm) -> PlanRequest:
     if not isinstance(goal, Pose):
         goal = _within_limits(arm, checked_goal(arm, goal))
     check_count("seed", request.seed, "(-inf, inf)")
-    if request.next_motion is not None:
-        checked_kind("next_motion", request.next_motion, NextMotion)
-        checked_kind("next_motion.path", request.next_motion.path, PosePath)
+    then = request.next_motion
+    if then is not None:
+        checked_kind("next_motion", then, NextMotion)
+        checked_kind("next_motion.path", then.path, PosePath)
+        then = then._replace(allowed=checked_contacts(then.allowed, "next_motion.allowed"))
     start = _within_limits(arm, arm.checked(request.start))
     if request.leaving is not None:
         _check_leaving(arm, start, checked_kind("leaving", request.leaving, PosePath))
-    return request._replace(start=start, goal=goal, obstacles=checked_obstacles(request.obstacles))
+    obstacles = checked_obstacles(request.obstacles)
+    seed = int(request.seed)  # numpy's small whole numbers overflow where Python's do not
+    return request._replace(start=start, goal=goal, obstacles=obstacles, next_motion=then, seed=seed)
 
 
 def reduced_request(request: PlanRequest, most: int) -> tuple[PlanRequest, float]:

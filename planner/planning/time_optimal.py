@@ -22,7 +22,7 @@ from ..errors import BadOption, BadShape, PlanFailed
 from ..ranges import check_range
 
 REPEAT = 1e-8
-"""Part of the path below which a step is none: neighbors are the same waypoint."""
+"""Share of the whole path up to which a step counts as none: its ends are one waypoint."""
 PARAMETER_RANGE = 5000.0
 """Value of the path parameter at the end, for toppra's absolute tolerances: at 1 and at 100 it fails on many paths with
 very uneven steps, at 1000 on few, from 3000 on on none of 700 random ones."""
@@ -70,7 +70,7 @@ class _Profile(NamedTuple):
 
 
 def time_optimal(joints: ArrayLike, velocity_limits: ArrayLike, acceleration_limits: ArrayLike, dt: float) -> TimedPath:
-    """The fastest way along a joint path, from rest to rest, sampled every dt.
+    """Return the fastest motion along a joint path, from rest to rest, sampled every dt.
 
     A path of straight lines would have to stop at each corner, so a natural cubic spline is put through the
     waypoints: the closer they are, the closer it stays to the lines. Both limits hold at all times, not only at the

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import BadOption
 from ..escape.detour import GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
-from ..planning.joint_space_motion import NO_CLEAR_POSTURE, NO_JOINT_PATH
+from ..planning.joint_space_motion import DEEP_CONTACT, NO_CLEAR_POSTURE, NO_JOINT_PATH
 from ..planning.plan import WHY
 from ..planning.settings import PlanSettings
 from ..ranges import check_ranges
@@ -29,7 +29,7 @@ FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
 )  # fmt: skip
 BLOCKING = (
     *(WHY[status] for status in (START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT)),
-    "start in collision", "goal in collision", NO_CLEAR_POSTURE, NO_JOINT_PATH,
+    "start in collision", "goal in collision", NO_CLEAR_POSTURE, NO_JOINT_PATH, DEEP_CONTACT,
 )  # fmt: skip
 """Reasons of a failed plan that mean: an obstacle is in the way."""
 STATES = (FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED)

@@ -3,12 +3,12 @@
 | mode | the arm | entered | left |
 |---|---|---|---|
 | PURSUING | follows the motion's path | by `go`; by a plan without a detour | to any other mode |
-| DETOURING | follows a detour of it | by a plan with a detour, also past what moves | to any other mode |
+| DETOURING | follows a detour of it | by a plan with a detour, also past moving obstacles | to any other mode |
 | TRACKING | follows joints found by a search | by a plan through joint space | to any other mode |
 | DONE | stands at the end | at the end of the path or of the joints | by `go` or `stop` |
 | FAILED | stands where it is | without progress for too long | by `go` or `stop` |
 
-Waiting for something that moves to pass is part of PURSUING and DETOURING: see `waiting`.
+Waiting for a moving obstacle to pass is part of PURSUING and DETOURING: see `waiting`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class MotionState:
         nominal: the path that was asked for.
         detours: False: along the path or not at all.
         next_motion: the motion that follows, if it is known.
-        plan_now: the next tick plans round what stands still.
+        plan_now: the next tick plans round the standing obstacles.
         mode: see the module.
         path: the path that is followed: (a part of) the nominal one, or a detour.
         pursuit: (4,) state of the pursuit along `path`; see `planner.control.pursuit`.
@@ -58,10 +58,10 @@ class MotionState:
         tries: number of stalls so far.
         stalled: seconds of all stalls before the current one.
         refusal: reason and detail of the last plan; "" if it succeeded.
-        reason: why the motion failed; "".
-        detail: the facts of the failure; "".
+        reason: the kind of failure; "" if the motion has not failed.
+        detail: the facts of the failure; else "".
         line: (n, 8) path from the start's pose on, which the tool must not leave; None: not needed yet.
-        waiting: the arm stands until something that moves has passed.
+        waiting: the arm stands until a moving obstacle has passed.
         decision_left: seconds until going on, waiting and detours are compared again.
     """
 

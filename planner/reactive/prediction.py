@@ -25,7 +25,7 @@ from ..safety.guarded_pursuit import guarded_tick
 from ..safety.safety_layer import FREE, safe_velocity
 
 SAME_PLACE = 1e-3
-"""Displacement [m, or weighted rad] of a static obstacle from which on the scene has changed."""
+"""Weighted distance [m] beyond which a displaced static obstacle counts as a change of the scene."""
 SPACING, MOST_PLACES = 0.04, 10
 """Distance [m] between the places at which a moving obstacle is planned round, and their maximum number."""
 BEFORE, BEHIND = 0.4, 0.8

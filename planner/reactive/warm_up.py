@@ -46,7 +46,7 @@ def warm_up(arm: Arm, body: Body) -> None:
     q = 0.5 * (np.maximum(arm.lower, -1.0) + np.minimum(arm.upper, 1.0))
     row = np.zeros(BODY.width)
     row[BODY.frame], row[BODY.radius] = arm.dof - 1.0, 0.001
-    point, path = Body(row[None], ("point",)), _sideways(arm.fk(q))
+    point, path = Body(row[None], ("point",)), _upwards(arm.fk(q))
     _algebra(path.dqs)
     for seen in ((FAR,), (replace(FAR, velocity=SLOW),)):
         _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT)), q, path, seen)
@@ -59,8 +59,8 @@ def warm_up(arm: Arm, body: Body) -> None:
     scene.tightest_of_tool(path[0])
 
 
-def _sideways(start: Pose) -> PosePath:
-    """A short path upwards."""
+def _upwards(start: Pose) -> PosePath:
+    """Return a short path upwards."""
     up = Pose.from_position_quaternion([0.0, 0.0, STEPS * STEP]) @ start
     return final_path(start, imitated_path(resampled(screw_path(start, up, STEP), STEP), up), 1)
 

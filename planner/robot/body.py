@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -71,6 +71,8 @@ class Body:
             capsules may cover one piece. Where a capsule is close to something, the piece decides. (): no pieces.
         pairs: pairs (i, j), i < j, of capsules that can hit each other; the others always touch, or never can. None:
             unknown, see `self_collision.body_pairs`.
+        margins: most [m] that some of the pairs are asked to keep between them, since they pass closer by each other
+            than a usual margin in ordinary postures.
 
     Raises:
         BadModel: too many capsules, a frame no arm has, or implausible numbers.
@@ -82,6 +84,7 @@ class Body:
     held: tuple[str, ...] = field(default=())
     hulls: tuple[Hull | None, ...] = field(default=())
     pairs: tuple[tuple[int, int], ...] | None = field(default=None)
+    margins: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
     def __post_init__(self):
         rows = frozen(numbers("body: rows", self.rows))
@@ -104,6 +107,12 @@ class Body:
                     reason = f"({i:g}, {j:g}) is not (i, j) with whole numbers 0 <= i < j < {len(rows)}"
                     raise BadModel("body", f"pairs[{k}]", reason)
             object.__setattr__(self, "pairs", tuple((int(i), int(j)) for i, j in pairs))
+        margins = checked_kind("body: margins", self.margins, Mapping)
+        values = checked_array("body: margins", list(margins.values()), (None,), finite=False)
+        for pair, margin in zip(margins, values, strict=True):
+            if pair not in (self.pairs or ()) or not 0.0 <= margin <= 100.0:
+                raise BadModel("body", "margins", f"{pair}: {margin:g} is no length from 0 to 100 m of a known pair")
+        object.__setattr__(self, "margins", dict(zip(margins, values.tolist(), strict=True)))
 
     def _check_hulls(self) -> None:
         if len(self.hulls) != len(self.rows):
@@ -151,7 +160,7 @@ class Body:
         if pairs is not None:  # what is held touches the hand, and hangs before the link that carries the hand
             others = np.flatnonzero(self.rows[:, BODY.frame] < arm.dof - 2)
             pairs = (*pairs, *((int(i), len(self) + k) for i in others for k in range(len(rows))))
-        return Body(np.vstack([self.rows, rows]), names, (*self.held, name), hulls, pairs)
+        return Body(np.vstack([self.rows, rows]), names, (*self.held, name), hulls, pairs, self.margins)
 
     def released(self) -> Body:
         """Return the body with an empty hand."""
@@ -171,7 +180,8 @@ class Body:
         place, pairs = {int(old): new for new, old in enumerate(keep)}, self.pairs
         if pairs is not None:
             pairs = tuple((place[i], place[j]) for i, j in pairs if i in place and j in place)
-        return Body(self.rows[np.asarray(keep, dtype=int)], names, held, hulls, pairs)
+        margins = {(place[i], place[j]): m for (i, j), m in self.margins.items() if i in place and j in place}
+        return Body(self.rows[np.asarray(keep, dtype=int)], names, held, hulls, pairs, margins)
 
     def ignoring(self, *names: tuple[str, str]) -> Body:
         """Return the body without the checks of some pairs of parts against each other.
@@ -190,7 +200,7 @@ class Body:
             raise BadOption("ignore", "of this body it is unknown which pairs can hit each other")
         wanted = {frozenset(pair) for pair in names}
         pairs = tuple(pair for pair in self.pairs if frozenset(self.names[k] for k in pair) not in wanted)
-        return replace(self, pairs=pairs)
+        return replace(self, pairs=pairs, margins={pair: m for pair, m in self.margins.items() if pair in pairs})
 
     def tool(self, arm: Arm) -> np.ndarray:
         """Return the capsules (m', 7) that move with the tcp: core ends a, b in the tcp's frame [m], radius [m]."""

@@ -24,7 +24,7 @@ from helpers.strategies import random_dq
 from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.geometry.pose import Pose, PosePath
-from onedemo.planner.geometry.shapes import Box, Obstacle, Shape
+from onedemo.planner.geometry.shapes import Box, Obstacle, Shape, Sphere
 from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import resampled, trimmed
 from onedemo.planner.imitation.tsia import screw_path
@@ -49,7 +49,7 @@ NEAREST = 0.2
 
 
 class Problem(NamedTuple):
-    """A leg to plan.
+    """A motion to plan.
 
     Attributes:
         kind: see `KINDS`.
@@ -337,3 +337,19 @@ def along(way: np.ndarray) -> np.ndarray:
 def tool_gap(tool: np.ndarray, obstacles, pose: Pose) -> float:
     """`Gauge` for a single pose."""
     return Gauge(tool, obstacles)(pose)
+
+
+def ball_at(position, radius: float = 0.05) -> Obstacle:
+    return Obstacle(Sphere(radius), at(position), name="ball")
+
+
+def everywhere(ball: Obstacle) -> tuple[tuple[str, str], ...]:
+    """Contacts of all moving parts of the Panda with a ball."""
+    return tuple((part, ball.name) for part in dict.fromkeys(panda()[1].names) if part != "link0")
+
+
+def blocked() -> tuple[np.ndarray, np.ndarray, Obstacle]:
+    """Joints on both sides of a ball that the hand would sweep through."""
+    arm, _, home = panda()
+    turn = np.array([1.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return home, home + turn, ball_at(arm.fk(home + 0.5 * turn).position)

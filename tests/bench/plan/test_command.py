@@ -219,7 +219,6 @@ def test_obstacles_that_move_are_judged_as_they_move(scene_file, capsys):
 def test_held_objects_allowed_contacts_and_urdf_robots(scene_file):
     text = f"""
 robot: {{urdf: {panda_urdf()}, tcp_frame: panda_link8, base: {{position: [0, 0, 0.1]}}}}
-start: [0.0, 0.2, 0.0, -2.2, 0.0, 2.4, 0.78]
 demonstration: [[0.45, -0.1, 0.4, 0, 1, 0, 0], [0.45, 0.1, 0.4, 0, 1, 0, 0]]
 goal: [0.45, 0.2, 0.4, 0, 1, 0, 0]
 held: {{name: cup, shape: sphere, radius: 0.02, tcp_from_object: {{position: [0, 0, 0.1]}}}}
@@ -270,11 +269,19 @@ def test_robots_come_from_urdf_and_mjcf_files_beside_the_scene(tmp_path, capsys)
         """<mujoco><worldbody><body name="a"><joint name="x"/><geom size="0.1"/><body name="b"><joint name="y"/>
         <geom size="0.1"/><site name="tip" pos="0.3 0 0"/></body></body></worldbody></mujoco>"""
     )
-    arm, body, _ = read("mjcf: r.xml, tool: tip, velocity_limits: [1.5], locked: {x: 0.1}")
-    assert (arm.joint_names, arm.velocity_limits.tolist()) == (("y",), [1.5]) and set(body.names) == {"link0", "link1"}
+    for speeds in ("[1.5]", "1.5"):
+        arm, body, _ = read(f"mjcf: r.xml, tool: tip, velocity_limits: {speeds}, locked: {{x: 0.1}}")
+        assert (arm.joint_names, arm.velocity_limits.tolist()) == (("y",), [1.5])
+        assert set(body.names) == {"link0", "link1"}
     for robot, says in (
         ("mjcf: robot.urdf, tool: tip, velocity_limits: [1]", "robot: .*robot.urdf: mjcf: has no <mujoco>"),
         ("urdf: r.xml, tool: b", "robot: .*r.xml: urdf: has no <robot>"),
+        ('urdf: robot.urdf, tool: ""', "robot: .*frame '': not in the model"),
+        ("urdf: robot.urdf, tool: hand, base: {position: [0, 0, 1000]}", r"s\.yaml: robot\.base: .*1000 m away"),
+        (
+            "urdf: robot.urdf, tool: hand, base: {position: [0, 0, 0], quaternion: [2, 0, 0, 0]}",
+            r"s\.yaml: robot\.base: .*norm 2; expected 1",
+        ),
         ("urdf: robot.urdf, tool: hand, base_link: base, srdf: none.srdf", "robot: none.srdf: SRDF: no such file"),
         ("urdf: robot.urdf, tool: hand", "robot: .*joint 'drive': is neither a hinge nor a slide"),
     ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import fcl
 import numpy as np
@@ -279,12 +280,49 @@ def test_hulls_that_do_not_fit_are_refused():
         Body(rows, names, hulls=(Hull(np.full((4, 3), np.nan)),))
     with pytest.raises(BadModel, match=r"pairs\[0\]"):
         Body(rows, names, pairs=((0, 1),))
+    for margins in ({(0, 1): 0.01}, {(0, 1): math.nan}):
+        with pytest.raises(BadModel, match="margins"):
+            Body(rows, names, margins=margins)
+    with pytest.raises(BadModel, match="margins"):
+        Body(np.tile(rows, (2, 1)), names * 2, pairs=((0, 1),), margins={(0, 1): -0.01})
     with pytest.raises(WrongType, match="hull of link1"):
         Body(rows, names, hulls=(np.zeros((4, 3)),))
     with pytest.raises(BadOption, match="unknown"):
         Body(rows, names).ignoring(("link1", "link1"))
     with pytest.raises(UnknownName, match="elbow"):
         Body(rows, names, pairs=()).ignoring(("link1", "elbow"))
+
+
+@for_all(seeds, max_examples=60)
+def test_a_pair_keeps_the_smaller_of_its_own_and_the_usual_margin(seed):
+    _, arm, body, pairs, _, rng = robot(seed)
+    margins = {pair: float(rng.choice([0.0, 0.004, 0.05])) for pair in pairs if rng.uniform() < 0.7}
+    kept = {pair: min(margins.get(pair, math.inf), SAFETY.self_distance) for pair in pairs}
+    close = replace(body, pairs=tuple(pairs), margins=margins)
+    g = robot_arrays((arm,), (close,), pack(()), pairs=pairs, settings=SAFETY.packed(0.01))
+    layer = SafetyLayer([arm], [close], [], 0.02, settings=SAFETY, pairs=pairs)
+    for q in rng.uniform(-2.5, 2.5, (5, arm.dof)):
+        slack = math.inf
+        for pair in pairs:
+            usual = replace(SAFETY, self_distance=kept[pair]).packed(0.01)
+            alone = robot_arrays((arm,), (body,), pack(()), pairs=[pair], settings=usual)
+            slack = min(slack, slack_at(alone, q, 0.0, 1.0))
+        for work in (g, layer.work):
+            assert slack_at(work, q, 0.0, 1.0) == pytest.approx(slack, abs=1e-9)
+            place_capsules(work, q, ROW.placed)
+            assert min(find_near(work, 5.0), 1.0) == pytest.approx(slack, abs=1e-9)
+            assert joint_edge_is_clear(work, q, q) == (slack >= 0.0)
+        if slack > 1e-6:
+            velocity = layer(q, rng.normal(size=arm.dof)).velocity
+            assert slack_at(layer.work, q + 0.02 * velocity, 0.0, 1.0) > -1e-9
+
+
+def test_margins_go_with_their_pairs():
+    rows = np.array([[k, 0, 0, 0, 0, 0, 0.1, 0.03] for k in range(-1, 4)], dtype=float)
+    body = Body(rows, ("base", "link1", "link2", "link3", "hand"), pairs=((0, 4), (1, 4)), margins={(1, 4): 0.003})
+    held = body.holding("block", Sphere(0.02), Pose.identity(), random_arm(1, 4))
+    assert held.margins == held.released().margins == {(1, 4): 0.003} and body.moving().margins == {(0, 3): 0.003}
+    assert body.ignoring(("link1", "hand")).margins == {} and body.ignoring(("base", "hand")).margins == body.margins
 
 
 def test_a_held_object_is_checked_against_the_arm_but_not_the_hand():

@@ -25,7 +25,9 @@ def thin_arm(seed: int) -> tuple:
     rows = [[k, 0, 0, 0, 0.15, 0, 0, 0.08] for k in range(-1, 4)]
     bar = np.array([[x, y, z] for x in (0.0, 0.15) for y in (-0.01, 0.01) for z in (-0.01, 0.01)])
     hull = Hull(bar, 0.002)
-    body = Body(np.array(rows), tuple(f"part{k}" for k in range(5)), hulls=(hull,) * 5, pairs=((0, 3),))
+    body = Body(
+        np.array(rows), tuple(f"part{k}" for k in range(5)), hulls=(hull,) * 5, pairs=((0, 3),), margins={(0, 3): 0.004}
+    )
     obstacles = [Obstacle(Sphere(0.05), random_pose(rng, rng.uniform(-0.6, 0.6, 3)), name=f"ball{k}") for k in range(4)]
     solid = Mesh.hull_of(rng.normal(size=(12, 3)) * 0.05)
     obstacles.append(Obstacle(solid, random_pose(rng, rng.uniform(-0.6, 0.6, 3)), name="stone"))
@@ -79,7 +81,7 @@ def test_a_log_keeps_hulls_and_pairs_to_the_bit(tmp_path):
     log = MotionLog(arm, body, tuple(obstacles), np.zeros(1), np.zeros((1, 4)), 0.0)
     write_log(log, tmp_path / "log.json")
     again = read_log(tmp_path / "log.json").body
-    assert again.pairs == body.pairs and len({id(hull) for hull in again.hulls}) == 1
+    assert again.pairs == body.pairs and again.margins == body.margins and len({id(hull) for hull in again.hulls}) == 1
     assert np.array_equal(again.hulls[0].corners, body.hulls[0].corners) and again.hulls[0].rounding == 0.002
 
 
@@ -93,6 +95,9 @@ def test_a_log_keeps_hulls_and_pairs_to_the_bit(tmp_path):
         (lambda t: t["hulls"][0].update(corners=[[0, 0]]), r"corners\[0\]"),
         (lambda t: t.update(pairs=[[3, 1]]), "pairs"),
         (lambda t: t.update(pairs=[[0, 99]]), "pairs"),
+        (lambda t: t.update(margins=[[0, 1, 0.004]]), "margins"),
+        (lambda t: t.update(margins=[[0, 3, -0.004]]), "margins"),
+        (lambda t: t.update(margins=[[0, 3]]), "margins"),
     ],
 )
 def test_hulls_of_a_file_are_checked(tmp_path, change, says):

@@ -12,9 +12,11 @@ from helpers.random_scenes import SOLVABLE, at, demonstrated, panda, planner_of,
 from helpers.strategies import for_all, st
 
 from onedemo.planner.errors import BadShape, NotFinite, PlanFailed
+from onedemo.planner.escape.repet import escape_path, point_tool
 from onedemo.planner.geometry.pose import PosePath
 from onedemo.planner.geometry.shapes import Obstacle, Sphere
 from onedemo.planner.judge.certify import certify
+from onedemo.planner.planning.joint_goal import MOST_POSES, tool_path
 from onedemo.planner.planning.joint_space_rrt import connect, joint_edge_is_clear, sample_range
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planner import Planner
@@ -80,6 +82,16 @@ def test_the_same_seed_gives_the_same_plan_and_another_seed_another():
     assert one.joints.shape != other.joints.shape or not np.array_equal(one.joints, other.joints)
 
 
+@pytest.mark.parametrize("seed", [np.int8(3), np.uint8(3), np.int16(3), np.int8(-128)], ids=repr)
+def test_a_seed_may_be_any_kind_of_whole_number(seed):
+    scene = problem("gap", 0)
+    one, same = (planned(scene, seed=each) for each in (seed, int(seed)))
+    np.testing.assert_array_equal(one.joints, same.joints)
+    path, tool = demonstrated(), point_tool(0.05)
+    one, same = (escape_path(path, tool, scene.obstacles, seed=each).path for each in (seed, int(seed)))
+    np.testing.assert_array_equal(one.dqs, same.dqs)
+
+
 def test_a_refined_plan_still_ends_at_the_joints():
     plan = planned(problem("convex", 2))
     refined = timed(plan)
@@ -143,6 +155,16 @@ def test_the_goals_array_is_the_plans_own():
     goal[:] = 0.0
     np.testing.assert_array_equal(plan.request.goal, scene.posture)
     np.testing.assert_array_equal(plan.goal_pose.dq, panda()[0].fk(scene.posture).dq)
+
+
+@pytest.mark.parametrize("count", [1, 2, 100, 101, 102, 199, 200, 201, 5000])
+def test_of_the_tools_path_no_more_poses_are_kept_than_allowed(count):
+    arm, _, home = panda()
+    joints = np.linspace(home, home + 0.1, count)
+    path = tool_path(arm, joints)
+    assert min(count, 0.5 * MOST_POSES) <= len(path) <= MOST_POSES + 1
+    for pose, q in ((path[0], joints[0]), (path[-1], joints[-1])):
+        np.testing.assert_array_equal(pose, arm.fk(q).dq)
 
 
 # Joints beyond half a turn

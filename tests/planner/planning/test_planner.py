@@ -229,7 +229,7 @@ def test_a_leg_may_leave_along_a_path_of_its_own():
     assert nearest < 0.02 < np.linalg.norm(np.array(without) - up[-1].position, axis=1).min()
 
 
-# Contacts, held objects, the next leg
+# Contacts, held objects, the next motion
 
 
 def test_wanted_contacts_are_not_in_the_way():
@@ -562,7 +562,7 @@ def test_an_arm_from_a_urdf_is_planned_for():
 
 
 def test_frames_of_the_world_do_not_matter_to_success():
-    """The same leg with the base elsewhere: another world, the same arm."""
+    """The same motion with the base elsewhere: another world, the same arm."""
     world = Pose.from_yaw([1.0, -2.0, 0.5], 0.8)
     arms = [Arm.from_urdf(panda_urdf(), tcp_frame="panda_link8", world_from_base=w) for w in (None, world)]
     plans = []

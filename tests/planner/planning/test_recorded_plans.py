@@ -79,7 +79,7 @@ def problem_of(name: str, seed: int):
 
 
 def solved_of(name: str, seeds: range) -> int:
-    """How many legs are solved; every one of them is judged."""
+    """How many motions are solved; every one of them is judged."""
     arm, body, _ = panda()
     planner, solved = Planner(arm, body), 0
     for seed in seeds:

@@ -40,6 +40,8 @@ def request(**change) -> PlanRequest:
         ({"leaving": HERE}, "leaving is .*; expected a PosePath"),
         ({"next_motion": demonstrated()}, "next_motion is .*; expected a NextMotion"),
         ({"next_motion": NextMotion(HERE)}, r"next_motion.path is .*; expected a PosePath"),
+        ({"next_motion": NextMotion(demonstrated(), allowed=5)}, "next_motion.allowed is 5, a int; expected"),
+        ({"next_motion": NextMotion(demonstrated(), allowed=["ab"])}, r"next_motion.allowed\[0\] is 'ab'.*a pair of"),
         ({"seed": None}, "option 'seed': None is not a whole number"),
         ({"seed": 0.5}, "option 'seed': 0.5 is not a whole number"),
     ],

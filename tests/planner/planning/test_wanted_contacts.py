@@ -6,39 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.random_scenes import SETTINGS, at, demonstrated, panda, planner_of
+from helpers.random_scenes import SETTINGS, at, ball_at, blocked, demonstrated, everywhere, panda, planner_of
 
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.control.arm_arrays import arm_arrays
-from onedemo.planner.geometry.shapes import Obstacle, Sphere
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.joint_space_motion import JointSpaceMotion, plan_joint_space
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planning_scene import CONTACT_ROOM, PlanningScene
 
-ARM, BODY, HOME = panda()
-PARTS = tuple(dict.fromkeys(name for name in BODY.names if name != "link0"))
-TURN = np.array([1.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-
-
-def ball_at(position, radius: float = 0.05) -> Obstacle:
-    return Obstacle(Sphere(radius), at(position), name="ball")
-
-
-def everywhere(ball: Obstacle) -> tuple[tuple[str, str], ...]:
-    return tuple((part, ball.name) for part in PARTS)
+ARM, BODY, _ = panda()
 
 
 def gap(plan: Plan) -> float:
     """Distance [m] from the ball that the independent judge certifies, contacts not exempt."""
     return certify(replace(plan.log(), allowed=(), safety=0.0)).clearance
-
-
-def blocked() -> tuple[np.ndarray, np.ndarray, Obstacle]:
-    """Joints on both sides of a ball that the hand would sweep through."""
-    middle = ARM.fk(HOME + 0.5 * TURN).position
-    return HOME, HOME + TURN, ball_at(middle)
 
 
 def test_a_way_to_joints_keeps_clear_of_what_it_may_touch_at_its_ends():
