@@ -95,7 +95,7 @@ class RunConfig(BaseModel):
 
     @property
     def condition(self) -> str:
-        """Level, with key poses and tool if they differ from it: "S 6" for six key poses."""
+        """Level, number of key poses if limited, and tool unless the level implies it: "S 6" for six key poses."""
         implied = IMPLIED.get(self.level, {})
         words = [self.level]
         if self.key_poses is not None:

@@ -68,17 +68,26 @@ class MeshJudge:
         self._base = robot.files.world_from_base
         self._rest = pin.neutral(self._model)
         for name, value in robot.others.items():
-            self._rest[self._place(name, urdf)] = value
-        self._moving = [self._place(name, urdf) for name in robot.arm.joint_names]
+            self._put(self._rest, self._joint(name, urdf), value)
+        self._moving = [self._joint(name, urdf) for name in robot.arm.joint_names]
         own = pairs_of_links(self._links, _neighbors(self._model, items), robot.files.srdf)
         self._own = [pair for pair in own if not self._is_fixed(items, *pair)]
         # the root cannot run into what stands still
         self._free = {k for k, item in enumerate(items) if int(item.parentJoint) > 0}
 
-    def _place(self, name: str, urdf: Path) -> int:
+    def _joint(self, name: str, urdf: Path) -> Any:
         if not self._model.existJointName(name):
             raise BadConfig(urdf, name, f"no such joint; known: {', '.join(self._model.names[1:])}")
-        return int(self._model.joints[self._model.getJointId(name)].idx_q)
+        joint = self._model.joints[self._model.getJointId(name)]
+        if int(joint.nv) != 1:
+            raise BadConfig(urdf, name, "is neither a hinge nor a slide")
+        return joint
+
+    @staticmethod
+    def _put(q: np.ndarray, joint: Any, value: float) -> None:
+        """Write a joint's position [rad or m] into a configuration: of an endless joint its cosine and sine."""
+        first, count = int(joint.idx_q), int(joint.nq)
+        q[first : first + count] = value if count == 1 else (np.cos(value), np.sin(value))
 
     @staticmethod
     def _is_fixed(items: Any, first: int, second: int) -> bool:
@@ -115,7 +124,8 @@ class MeshJudge:
         import fcl
 
         rest, centers = self._rest.copy(), np.empty((len(self._solids), 3))
-        rest[self._moving] = q
+        for joint, value in zip(self._moving, q, strict=True):
+            self._put(rest, joint, value)
         self._pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._placed, rest)
         rotation, position = self._base.rotation, self._base.position
         for k, (solid, pose) in enumerate(zip(self._solids, self._placed.oMg, strict=True)):

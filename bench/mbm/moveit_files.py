@@ -7,8 +7,11 @@ request has `start_state.joint_state` of all joints and `goal_constraints[0].joi
 
 from __future__ import annotations
 
+import lzma
+import math
 import re
 import tarfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +20,7 @@ import numpy as np
 
 from ...configs import BadConfig
 from ...planner import Obstacle, Pose
+from ...planner.errors import OneDemoError
 from .problems import Problem, primitive
 
 MEMBER = re.compile(r"(?:.*/)?([^/]+)_([^/_]+)/(scene|request)(\d+)\.yaml")
@@ -60,23 +64,33 @@ def _messages(path: Path) -> Iterator[tuple[str, str, int, dict[str, Any]]]:
                     except (YAMLError, ValueError) as error:
                         raise BadConfig(path, member.name, " ".join(str(error).split())) from None
                     yield found[1], found[3], int(found[4]), message
-    except (OSError, tarfile.TarError, EOFError) as error:
-        raise BadConfig(path, "archive", getattr(error, "strerror", None) or str(error)) from None
+    except (OSError, tarfile.TarError, EOFError, lzma.LZMAError, zlib.error) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise BadConfig(path, "archive", reason) from None
 
 
 def _problem(path: Path, key: tuple[str, int], scene: dict[str, Any], request: dict[str, Any]) -> Problem:
+    where = "{} {}".format(*key)
     try:
         objects = scene["world"]["collision_objects"] or []
         obstacles = tuple(obstacle for each in objects for obstacle in _obstacles(each))
-        if scene.get("robot_state", {}).get("attached_collision_objects"):
-            raise BadConfig(path, "{} {}".format(*key), "has attached objects, which are not read")
+        if (scene.get("robot_state") or {}).get("attached_collision_objects"):
+            raise BadConfig(path, where, "has attached objects, which are not read")
+        octomap = scene["world"].get("octomap") or {}
+        if (octomap.get("octomap") or octomap).get("data"):
+            raise BadConfig(path, where, "has an octomap, which is not read")
         state = request["start_state"]["joint_state"]
         start = dict(zip(state["name"], map(float, state["position"]), strict=True))
         constraints = request["goal_constraints"][0]["joint_constraints"]
         goal = {each["joint_name"]: float(each["position"]) for each in constraints}
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except OneDemoError as error:
+        raise error if isinstance(error, BadConfig) else BadConfig(path, where, str(error)) from None
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         what = f"{type(error).__name__} at {error}"
-        raise BadConfig(path, "{} {}".format(*key), f"is no scene and request of MoveIt ({what})") from None
+        raise BadConfig(path, where, f"is no scene and request of MoveIt ({what})") from None
+    for name, value in (*start.items(), *goal.items()):
+        if not math.isfinite(value):
+            raise BadConfig(path, where, f"{name} stands at {value}")
     return Problem(*key, obstacles, start, goal)
 
 
@@ -97,4 +111,7 @@ def _obstacles(message: dict[str, Any]) -> Iterator[Obstacle]:
 def _pose(message: dict[str, Any]) -> Pose:
     x, y, z, w = map(float, message["orientation"])
     quaternion = np.array([w, x, y, z])
-    return Pose.from_position_quaternion(message["position"], quaternion / np.linalg.norm(quaternion))
+    length = np.linalg.norm(quaternion)
+    if not length > 0.0:
+        raise ValueError(f"orientation {message['orientation']}")
+    return Pose.from_position_quaternion(message["position"], quaternion / length)

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 from ...configs import BadConfig
 from ...planner import Arm, Body, Pose, body_from_urdf
+from ...planner.models.urdf_file import read_urdf_file
+from ...planner.models.xml_tree import parsed_xml
 
 PACKAGE = "example-robot-data"
 MODEL = "cmeel.prefix/share/example-robot-data/robots/panda_description"
@@ -113,15 +115,14 @@ def robot_of(files: RobotFiles, start: Mapping[str, float], goal: Collection[str
         spans: joint name: lowest and highest position that its limits must hold.
 
     Raises:
-        BadModel: the model has no such arm.
-        BadConfig: the file is no XML.
+        BadModel: the file is no URDF, or has no such arm.
     """
     others = {name: value for name, value in start.items() if name not in goal}
     with TemporaryDirectory() as folder:
         path = Path(folder) / files.urdf.name
         text, _ = widened(files.urdf, spans)
         path.write_text(text, encoding="utf-8")
-        followers = {joint.get("name") for joint in ElementTree.fromstring(text) if joint.find("mimic") is not None}
+        followers = {coupling.follower for coupling in read_urdf_file(path).couplings}
         locked = {name: value for name, value in others.items() if name not in followers}
         arm = Arm.from_urdf(path, tcp_frame=files.tool, world_from_base=files.world_from_base, locked=locked)
         folders = files.urdf.resolve().parents
@@ -139,14 +140,11 @@ def widened(urdf: Path, spans: Spans) -> tuple[str, list[str]]:
         spans: joint name: lowest and highest position [rad or m].
 
     Raises:
-        BadConfig: the file is no XML.
+        BadModel: the file is no URDF.
     """
-    try:
-        tree = ElementTree.parse(urdf)
-    except ElementTree.ParseError as error:
-        raise BadConfig(urdf, "URDF", str(error)) from None
-    notes = []
-    for joint in tree.getroot().iter("joint"):
+    read_urdf_file(urdf)  # refuses what is no URDF
+    robot, notes = parsed_xml(urdf, "URDF"), []
+    for joint in robot.iter("joint"):
         name, limit = str(joint.get("name")), joint.find("limit")
         if limit is None or name not in spans or joint.get("type") == "continuous":
             continue
@@ -157,8 +155,8 @@ def widened(urdf: Path, spans: Spans) -> tuple[str, list[str]]:
                 notes.append(
                     f"{name}: the file's {side} limit {old:g} is widened to {value:g}, to which problems lead."
                 )
-    for mesh in tree.getroot().iter("mesh"):
+    for mesh in robot.iter("mesh"):
         place = str(mesh.get("filename"))
         if "://" not in place:
             mesh.set("filename", str(urdf.resolve().parent / place))
-    return ElementTree.tostring(tree.getroot(), encoding="unicode"), notes
+    return ElementTree.tostring(robot, encoding="unicode"), notes

@@ -108,8 +108,8 @@ def report_lines(loaded: LoadedRobot, request: RobotRequest) -> Iterator[tuple[s
     from .robot_summary import reach_of, volumes_of
 
     arm, body, report = loaded.arm, loaded.body, loaded.arm.report
-    chosen = "" if request.tool else " (chosen; --tool names another)"
-    yield "robot     ", "bold", f"{arm.name}: {arm.dof} joints to {loaded.tool}{chosen}"
+    chosen = " (chosen; --tool names another)" if request.tool is None else ""
+    yield "robot     ", "bold", f"{arm.name}: {arm.dof} joint{'s' if arm.dof > 1 else ''} to {loaded.tool}{chosen}"
     width = max(map(len, arm.joint_names))
     speeds = "the file has no speeds" if _without_speeds(request) else ""
     for name, kind, low, high, speed in zip(
@@ -124,6 +124,10 @@ def report_lines(loaded: LoadedRobot, request: RobotRequest) -> Iterator[tuple[s
     pairs = body_pairs(arm, body, SafetySettings().self_distance)
     parts = len(set(body.names))
     yield "body      ", "", f"{len(body)} capsules in {parts} parts; {len(pairs)} pairs are checked against each other"
+    closest = {(body.names[i], body.names[j]): margin for (i, j), margin in body.margins.items()}
+    for (one, other), margin in closest.items():
+        if margin < SafetySettings().self_distance:
+            yield "close     ", "", f"{one} and {other} pass each other by little: they keep {1e3 * margin:.1f} mm"
     if request.srdf is not None:
         named = ", ".join(f"{one} and {other}" for one, other in loaded.ignored) or "none"
         yield "srdf      ", "", f"pairs of parts that it exempts: {named}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,14 +14,14 @@ from ...planner.fitting.link_capsules import body_of
 from ...planner.fitting.mujoco_parts import parts_from_mujoco
 from ...planner.fitting.robot_parts import PartsRequest, ReadRobot, pieces_of_links
 from ...planner.fitting.urdf_parts import parts_from_urdf
-from ...planner.models.model_report import ModelReport
+from ...planner.models.model_report import UNSEEN, ModelReport
 from ...planner.models.srdf import ignored_pieces, read_srdf
 from ...planner.models.urdf_model import read_urdf
+from ...planner.models.xml_tree import root_of
 from .tool_choice import tool_of_mujoco, tool_of_urdf
 
-ROOT = re.compile(rb"<(robot|mujoco)\b")
-HEAD = 2**16
-"""Number of bytes in which the root of a file must begin."""
+KINDS = ("robot", "mujoco")
+"""Root elements of URDF and of MJCF."""
 UNKNOWN_SPEED = 1.0
 """Speed [rad/s or m/s] of joints whose file has none, where only their geometry is asked for."""
 
@@ -84,7 +83,7 @@ def load_robot(request: RobotRequest) -> LoadedRobot:
     pairs = {} if request.srdf is None else read_srdf(request.srdf)
     ignored = sorted(ignored_pieces(pairs, pieces_of_links(parts, arm.dof), request.srdf or "") if pairs else ())
     body = body_of(parts.robot, arm, None).ignoring(*ignored)
-    report = _merged(arm.report, parts.report)
+    report = _merged(arm.report, parts.report, visuals=request.visuals)
     return LoadedRobot(replace(arm, report=report), body, parts, tool, tuple(ignored))
 
 
@@ -96,15 +95,15 @@ def kind_of(file: Path) -> str:
     """
     if not file.is_file():
         raise BadModel(file, "robot", "no such file")
-    with file.open("rb") as opened:
-        found = ROOT.search(opened.read(HEAD))
-    if found is None:
-        raise BadModel(file, "robot", "is neither URDF nor MJCF: it has no <robot> and no <mujoco>")
-    return found.group(1).decode()
+    found = root_of(file)
+    if found not in KINDS:
+        what = f"its root is <{found}>" if found else "it has no element"
+        raise BadModel(file, "robot", f"is neither URDF nor MJCF: {what}, not <robot> or <mujoco>")
+    return found
 
 
 def _urdf(request: RobotRequest) -> tuple[Arm, ReadRobot, str]:
-    tool = request.tool or tool_of_urdf(read_urdf(request.file))
+    tool = _chosen(request, tool_of_urdf(read_urdf(request.file))) if request.tool is None else request.tool
     arm = Arm.from_urdf(
         request.file,
         tcp_frame=tool,
@@ -125,7 +124,7 @@ def _mujoco(request: RobotRequest) -> tuple[Arm, ReadRobot, str]:
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise BadModel(request.file, "MJCF", f"cannot be compiled: {reason}") from None
-    tool = request.tool or tool_of_mujoco(model)
+    tool = _chosen(request, tool_of_mujoco(model)) if request.tool is None else request.tool
     is_site = any(model.site(k).name == tool for k in range(model.nsite))
     arm = Arm.from_mujoco(
         model,
@@ -139,13 +138,22 @@ def _mujoco(request: RobotRequest) -> tuple[Arm, ReadRobot, str]:
     return arm, parts_from_mujoco(model, arm, None, _parts_request(request, arm)), tool
 
 
+def _chosen(request: RobotRequest, tool: str | None) -> str:
+    """Return a tool frame that was chosen, if one could be."""
+    if tool is None:
+        raise BadModel(request.file, "tool", "there is no single longest chain of joints; name the tool")
+    if not tool:
+        raise BadModel(request.file, "tool", "the body at the end of the longest chain has no name; name the tool")
+    return tool
+
+
 def _parts_request(request: RobotRequest, arm: Arm) -> PartsRequest:
     """Return the request for the parts: joints before the tool are held by the arm already."""
     others = {name: value for name, value in request.locked.items() if name not in arm.report.held}
     return PartsRequest(others, request.visuals)
 
 
-def _merged(arm: ModelReport, body: ModelReport) -> ModelReport:
+def _merged(arm: ModelReport, body: ModelReport, *, visuals: bool) -> ModelReport:
     """Return the findings of both readers; the body's know more about geometry."""
-    unused = dict.fromkeys((*body.unused, *arm.unused))
+    unused = dict.fromkeys((*body.unused, *(line for line in arm.unused if not (visuals and line.startswith(UNSEEN)))))
     return ModelReport(arm.source, {**arm.held, **body.held}, tuple(unused), (*arm.warnings, *body.warnings))

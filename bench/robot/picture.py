@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...planner import Pose
+from ...planner.errors import UnfitShape
 from ...planner.fitting.link_pieces import surface
-from ...planner.fitting.robot_model import Geometry, world_from_parts
+from ...planner.fitting.robot_model import Geometry, places_of, world_from_parts
 from ...planner.robot.body import BODY
 from ...planner.robot.joint_frames import joint_frames, moved
 from ..drawing.convex_view import ConvexSolid, DrawingView, ball_along, union
@@ -69,26 +70,21 @@ def draw_robot(robot: LoadedRobot, file: Path) -> None:
 def _triangles(robot: LoadedRobot, frames: list[Pose]) -> np.ndarray:
     """Return the triangles (n, 3, 3) of the geometry of all covered parts in the world [m]."""
     read = robot.parts.robot
-    owner: list[int] = []
     reference = [Pose.identity(), *joint_frames(robot.arm, read.reference)]
     found = [np.zeros((0, 3, 3))]
-    for part, world, links in zip(read.parts, world_from_parts(read.parts), robot.parts.links, strict=True):
-        above = -2 if part.parent < 0 else owner[part.parent]
-        owner.append(above if part.frame is None else part.frame)
-        beside = part.frame is None and owner[-1] == -1
-        if owner[-1] > -2 and links and not beside:
-            placed = frames[owner[-1] + 1] @ reference[owner[-1] + 1].inverse() @ world
+    places = places_of(read.parts, robot.arm.dof)
+    for part, world, place in zip(read.parts, world_from_parts(read.parts), places, strict=True):
+        if place.frame is not None and place.piece:
+            placed = frames[place.frame + 1] @ reference[place.frame + 1].inverse() @ world
             found += [moved(placed, surface_of(geometry)) for geometry in part.geometry]
     return np.vstack(found)
 
 
 def surface_of(geometry: Geometry) -> np.ndarray:
     """Return the triangles (n, 3, 3) of an element [m]: of its mesh, or of its hull; none if it has no volume."""
-    from scipy.spatial import QhullError
-
     try:
         return surface(geometry) if len(geometry.points) > 3 else np.zeros((0, 3, 3))
-    except QhullError:
+    except UnfitShape:
         return np.zeros((0, 3, 3))
 
 

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...planner import Arm
-from ...planner.fitting.robot_model import Geometry
-from ...planner.fitting.robot_parts import names_of_pieces
+from ...planner.fitting.robot_model import Geometry, places_of
 from ...planner.geometry.hulls import Cover, capsule_volume, union_volume
 from ...planner.robot.body import BODY
 from .load_robot import LoadedRobot
@@ -41,7 +40,7 @@ class PieceVolume(NamedTuple):
 
 def postures_of(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
     """Return lower and upper limits (dof,) with finite ones in place of infinite ones."""
-    return np.maximum(arm.lower, -ENDLESS), np.minimum(arm.upper, ENDLESS)
+    return np.where(np.isfinite(arm.lower), arm.lower, -ENDLESS), np.where(np.isfinite(arm.upper), arm.upper, ENDLESS)
 
 
 def reach_of(arm: Arm) -> float:
@@ -68,12 +67,12 @@ def reach_of(arm: Arm) -> float:
 def volumes_of(robot: LoadedRobot) -> list[PieceVolume]:
     """Return the volumes of every part of a body, base first."""
     body, read = robot.body, robot.parts.robot
-    names = names_of_pieces(read, robot.arm.dof)
+    places = places_of(read.parts, robot.arm.dof)
     out = []
     for name in dict.fromkeys(body.names):
         rows = body.rows[np.array(body.names) == name]
         cover: Cover = [(row[BODY.a : BODY.b], row[BODY.b : BODY.radius], float(row[BODY.radius])) for row in rows]
-        parts = [part for part, piece in zip(read.parts, names, strict=True) if piece == name]
+        parts = [part for part, place in zip(read.parts, places, strict=True) if place.piece == name]
         swept = name == "fingers" or any(part.joints for part in parts)
         solid = np.nan if swept else sum(volume_of(geometry) for part in parts for geometry in part.geometry)
         out.append(PieceVolume(name, len(rows), union_volume(cover), float(solid)))

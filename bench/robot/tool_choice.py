@@ -30,14 +30,28 @@ def end_of_chain(parents: Sequence[int], joints: Sequence[int]) -> int:
     return node
 
 
-def tool_of_urdf(model: UrdfModel) -> str:
-    """Return the link at the end of a URDF's longest chain."""
+def end_that_moves(parents: Sequence[int], joints: Sequence[int]) -> int | None:
+    """Return the end of the longest chain; None if no joint moves it, since chains of equal length begin at once.
+
+    Args:
+        parents: see `end_of_chain`.
+        joints: see `end_of_chain`.
+    """
+    node = end = end_of_chain(parents, joints)
+    while node != 0 and joints[node] == 0:
+        node = parents[node]
+    return end if joints[node] else None
+
+
+def tool_of_urdf(model: UrdfModel) -> str | None:
+    """Return the link at the end of a URDF's longest chain; None if there is no single one."""
     parents = [int(parent) for parent in model.pinocchio.parents]
-    end = end_of_chain(parents, [0, *[1] * (len(parents) - 1)])
-    return next(name for name, joint in model.links() if joint == end)
+    end = end_that_moves(parents, [0, *[1] * (len(parents) - 1)])
+    return None if end is None else next(name for name, joint in model.links() if joint == end)
 
 
-def tool_of_mujoco(model: Any) -> str:
-    """Return the body at the end of a compiled model's longest chain."""
+def tool_of_mujoco(model: Any) -> str | None:
+    """Return the body at the end of a compiled model's longest chain, "" without a name; None: no single one."""
     joints = [int(count) for count in model.body_jntnum]
-    return model.body(end_of_chain([int(parent) for parent in model.body_parentid], joints)).name
+    end = end_that_moves([int(parent) for parent in model.body_parentid], joints)
+    return None if end is None else model.body(end).name

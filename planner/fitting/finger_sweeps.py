@@ -9,9 +9,9 @@ import numpy as np
 from ..errors import BadModel, UnfitShape
 from ..geometry.hulls import corner_points
 from ..geometry.shapes import Sphere, hull_corners
+from ..models.model_joints import SLIDES, TURNS, ModelJoint
 from ..robot.joint_frames import moved
-from ..robot.kinematics import PRISMATIC, REVOLUTE
-from .robot_model import BodyPart, Joint, RobotModel, joined
+from .robot_model import BodyPart, RobotModel, joined
 
 STEP = math.radians(15.0)
 """Largest step [rad] in which a revolute finger joint is swept."""
@@ -55,11 +55,11 @@ def through(robot: RobotModel, part: BodyPart, points: np.ndarray) -> np.ndarray
     return moved(part.pose, points)
 
 
-def sweep(joint: Joint, points: np.ndarray, source: str, name: str) -> np.ndarray:
+def sweep(joint: ModelJoint, points: np.ndarray, source: str, name: str) -> np.ndarray:
     """Sweep points by a joint over its whole range.
 
     Args:
-        joint: revolute, or prismatic with limits.
+        joint: one that turns, or slides within limits.
         points: (n, 3) in the frame of the joint's part [m].
         source: name of the model for messages.
         name: of the part, for messages.
@@ -70,12 +70,16 @@ def sweep(joint: Joint, points: np.ndarray, source: str, name: str) -> np.ndarra
     Raises:
         BadModel: any other joint.
     """
-    span = joint.high - joint.low
-    if joint.kind == PRISMATIC and math.isfinite(span):
-        return np.vstack([points + joint.low * joint.axis, points + joint.high * joint.axis])
-    if joint.kind != REVOLUTE:
-        raise BadModel(source, name, "hangs on a joint that is neither a hinge nor a slide with limits")
-    low = joint.low if span < 2.0 * math.pi else 0.0
+    low, high = joint.low - joint.rest, joint.high - joint.rest
+    span = high - low
+    if not np.isfinite(joint.axis).all():
+        raise BadModel(source, f"joint {joint.name!r}", "its axis is not a direction")
+    if joint.kind == SLIDES and math.isfinite(span):
+        return np.vstack([points + low * joint.axis, points + high * joint.axis])
+    if joint.kind != TURNS:
+        reason = f"hangs on {joint.name!r}, which is neither a hinge nor a slide with limits; locked holds it"
+        raise BadModel(source, name, reason)
+    low = low if span < 2.0 * math.pi else 0.0
     span = min(span, 2.0 * math.pi)
     count = max(1, math.ceil(span / STEP))
     half = 0.5 * span / count

@@ -20,7 +20,7 @@ from ..geometry.pose import Pose
 from ..robot.arm import Arm
 from ..robot.body import MAX_CAPSULES, Body, Hull
 from ..robot.joint_frames import joint_frames, moved
-from .link_pieces import Piece, convex_link_pieces, whole_pieces
+from .link_pieces import FLAT, Piece, convex_link_pieces, whole_pieces
 from .mesh_distances import MeshDistances
 from .refined_pieces import refined
 from .robot_model import RobotModel, world_from_parts
@@ -31,6 +31,8 @@ SMALLER, CLOSER = 0.85, 0.75
 """A link gets one more capsule if that reduces the volume, or the protrusion, to less than this fraction."""
 FINGER_EXCESS = 0.006
 """Approximate largest protrusion [m] of finger capsules, small because fingers go close to objects."""
+FARTHEST = 100.0
+"""Largest plausible distance of a point of a part from its frame [m]."""
 SAME = 1e-6
 """Tolerance [m, rad] within which joints of a model and of the arm coincide."""
 BULGES = (1.02, 1.25, 2.0, 5.0, np.inf)
@@ -55,6 +57,7 @@ def body_of(robot: RobotModel, arm: Arm, split: Split, *, exact: bool = True) ->
     world = world_from_parts(robot.parts)
     frames = [Pose.identity(), *joint_frames(arm, robot.reference)]
     _check_same(robot, arm, world, frames)
+    _check_numbers(robot)
     covering = _Covering(robot.source, split)
     if not exact:
         return covering.body(whole_pieces(robot, world, frames), hulls=False)
@@ -63,6 +66,7 @@ def body_of(robot: RobotModel, arm: Arm, split: Split, *, exact: bool = True) ->
         pieces = convex_link_pieces(robot, world, frames, bulge)
         if len(pieces) <= MAX_CAPSULES:
             break
+    covering.body(pieces)  # refuses what encloses no volume, which has no surface
     truth = MeshDistances(arm, pieces)
     return possible_contacts(arm, refined(arm, pieces, truth, covering.body, MAX_CAPSULES), truth)
 
@@ -74,6 +78,16 @@ def _check_same(robot: RobotModel, arm: Arm, world: list[Pose], frames: list[Pos
         off = np.cross(moved(world[part], position) - frame.position, direction)
         if np.abs(world[part].rotation @ axis - direction).max() > SAME or np.abs(off).max() > SAME:
             raise BadModel(robot.source, name, f"is not where the arm {arm.name!r} has it: they are not the same")
+
+
+def _check_numbers(robot: RobotModel) -> None:
+    """Refuse geometry that is nowhere."""
+    for part in robot.parts:
+        for geometry in part.geometry:
+            points = np.vstack([geometry.points, *(np.array(capsule[:2]) for capsule in geometry.exact)])
+            if not (np.abs(points) <= FARTHEST).all():
+                reason = f"its geometry has a point that is not finite or farther than {FARTHEST:g} m"
+                raise BadModel(robot.source, f"part {part.name!r}", reason)
 
 
 class _Covering:
@@ -99,6 +113,9 @@ class _Covering:
                 laid.append(hull)
         if not rows:
             raise BadModel(self._source, "collision geometry", "the arm has none")
+        if len(rows) > MAX_CAPSULES:
+            reason = f"it takes {len(rows)} capsules; allowed are {MAX_CAPSULES}"
+            raise BadModel(self._source, "collision geometry", reason)
         return Body(np.array(rows), tuple(labels), hulls=tuple(laid) if hulls else ())
 
     def _of(self, piece: Piece, *, few: bool) -> tuple[Cover, Hull | None]:
@@ -127,5 +144,5 @@ def _cover(piece: Piece, split: Split, source: str) -> Cover:
             pays = pays or sticks_out(finer, points) < CLOSER * sticks_out(fit, points)
             fit = finer if pays else fit
     except UnfitShape as error:
-        raise BadModel(source, piece.name, f"cannot be covered: {error.reason}") from None
+        raise BadModel(source, piece.name, f"{FLAT}: {error.reason}") from None
     return exact + fit

@@ -5,14 +5,18 @@ Not in the paper: the paper moves a point.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import BadModel, UnfitShape
 from ..geometry.pose import Pose
 from ..robot.joint_frames import moved
 from .finger_sweeps import swept, through
-from .robot_model import Geometry, RobotModel, joined, placed
+from .robot_model import Geometry, RobotModel, joined, placed, places_of
+
+FLAT = "the points of its geometry cannot be covered"
 
 
 class Piece(NamedTuple):
@@ -64,6 +68,9 @@ def convex_link_pieces(robot: RobotModel, world: list[Pose], frames: list[Pose],
 
     Returns:
         The pieces, the base first; of each the hull, or the capsules, are its geometry.
+
+    Raises:
+        BadModel: geometry that encloses no volume.
     """
     found: dict[tuple[int, str, int], list[Geometry]] = {}
     for name, frame, k, geometries in _elements(robot, world, frames):
@@ -73,8 +80,11 @@ def convex_link_pieces(robot: RobotModel, world: list[Pose], frames: list[Pose],
     for (frame, name, key), geometries in found.items():
         exact = [Geometry([capsule], np.zeros((0, 3))) for geometry in geometries for capsule in geometry.exact]
         solid = [Geometry([], g.points, g.triangles) for g in geometries if len(g.points)]
-        for geometry in exact + _merged(solid, bulge):
-            pieces.append(_piece(name, frame, key, world, geometry))
+        try:
+            whole = exact + _merged(solid, bulge)
+        except UnfitShape as error:
+            raise BadModel(robot.source, name, f"{FLAT}: {error.reason}") from None
+        pieces += [_piece(name, frame, key, world, geometry) for geometry in whole]
     return _ordered(pieces)
 
 
@@ -83,26 +93,17 @@ def _elements(robot: RobotModel, world: list[Pose], frames: list[Pose]):
 
     Geometries are in the frame, but those of the base in the frame of their part.
     """
-    last = len(frames) - 2
-    owner: list[int | None] = []
-    moving: list[bool] = []
-    for k, part in enumerate(robot.parts):
-        above, under = (None, False) if part.parent < 0 else (owner[part.parent], moving[part.parent])
-        frame = above if part.frame is None else part.frame
-        owner.append(frame)
-        moving.append(under or len(part.joints) > 0)
-        beside = part.frame is None and frame == -1
-        if frame is None or beside or under:
+    for k, (part, place) in enumerate(zip(robot.parts, places_of(robot.parts, len(frames) - 1), strict=True)):
+        frame = place.frame
+        if frame is None or not place.piece or place.below:
             continue
         to_frame = (world[k] if frame < 0 else frames[frame + 1]).inverse()
-        on_hand = part.frame is None and frame == last
         if part.joints:
             points = through(robot, part, swept(robot, k))
             geometries = [Geometry([], moved(to_frame @ world[part.parent], points))]
         else:
             geometries = [placed(to_frame @ world[k], geometry) for geometry in part.geometry]
-        name = ("fingers" if part.joints else "hand") if on_hand else f"link{frame + 1}"
-        yield name, frame, k, geometries
+        yield place.piece, frame, k, geometries
 
 
 def _piece(name: str, frame: int, key: int, world: list[Pose], geometry: Geometry) -> Piece:
@@ -117,34 +118,42 @@ def _ordered(pieces: list[Piece]) -> list[Piece]:
 
 def _merged(solids: list[Geometry], bulge: float) -> list[Geometry]:
     """Merge solids, the best pair first, as long as their hull is hardly larger than they are together."""
-    volumes = [_volume(solid.points) for solid in solids]
-    while len(solids) > 1:
+    left = dict(enumerate(solids))
+    volumes = {k: _volume(solid.points) for k, solid in left.items()}
+    common: dict[tuple[int, int], float] = {}  # volumes of the hulls of pairs, each found once
+    while True:
         best, least = None, bulge
-        for i in range(len(solids)):
-            for j in range(i + 1, len(solids)):
-                both = _volume(np.vstack([solids[i].points, solids[j].points]))
-                ratio = both / max(volumes[i] + volumes[j], 1e-12)
-                if ratio <= least:
-                    best, least = (i, j, both), ratio
+        for i, j in combinations(left, 2):
+            if (i, j) not in common:
+                common[i, j] = _volume(np.vstack([left[i].points, left[j].points]))
+            ratio = common[i, j] / max(volumes[i] + volumes[j], 1e-12)
+            if ratio <= least:
+                best, least = (i, j), ratio
         if best is None:
-            break
-        i, j, both = best
-        one, other = solids[i], solids[j]
+            return list(left.values())
+        one, other = left.pop(best[0]), left.pop(best[1])
         triangles = np.zeros((0, 3, 3))
         if len(one.triangles) or len(other.triangles):
             triangles = np.concatenate([surface(one), surface(other)])
-        solids = [s for k, s in enumerate(solids) if k not in (i, j)]
-        volumes = [v for k, v in enumerate(volumes) if k not in (i, j)]
-        solids.append(Geometry([], np.vstack([one.points, other.points]), triangles))
-        volumes.append(both)
-    return solids
+        new = 1 + max(volumes)
+        left[new] = Geometry([], np.vstack([one.points, other.points]), triangles)
+        volumes[new] = common[best]
 
 
 def surface(solid: Geometry) -> np.ndarray:
-    """Return the triangles (n, 3, 3) [m] of a solid's surface: its own, or those of its hull."""
-    from scipy.spatial import ConvexHull
+    """Return the triangles (n, 3, 3) [m] of a solid's surface: its own, or those of its hull.
 
-    return solid.triangles if len(solid.triangles) else solid.points[ConvexHull(solid.points).simplices]
+    Raises:
+        UnfitShape: it has none, and its points enclose no volume.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(solid.triangles):
+        return solid.triangles
+    try:
+        return solid.points[ConvexHull(solid.points).simplices]
+    except (QhullError, ValueError):
+        raise UnfitShape("solid", "points", "they enclose no volume") from None
 
 
 def _volume(points: np.ndarray) -> float:

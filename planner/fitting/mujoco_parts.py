@@ -10,17 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadModel
+from ..errors import BadModel, UnfitShape
 from ..geometry.hulls import corner_points
 from ..geometry.pose import Pose
 from ..geometry.shapes import Box, Capsule, Cylinder, Sphere
 from ..models.model_joints import ModelJoint, check_independent, swept_range
-from ..models.model_report import SHOWN, ModelReport, listed
+from ..models.model_report import NOT_SOLID, SHOWN, ModelReport, listed
 from ..models.mujoco_model import (
     geoms_of,
     mujoco_bodies,
+    mujoco_body_names,
     mujoco_couplings,
-    mujoco_id,
+    mujoco_joint_id,
     mujoco_joint_names,
     mujoco_joints,
     mujoco_pose,
@@ -28,14 +29,12 @@ from ..models.mujoco_model import (
     unused_of_mujoco,
 )
 from ..robot.arm import Arm
-from .robot_model import BodyPart, Geometry, RobotModel, placed
+from .robot_model import BodyPart, Geometry, RobotModel, placed, places_of
 from .robot_parts import (
     PartsRequest,
     ReadRobot,
     geometry_of,
     held_with_arm,
-    names_of_pieces,
-    swept_joint,
     unused_of_parts,
 )
 
@@ -54,7 +53,7 @@ def parts_from_mujoco(model: Any, arm: Arm, joint_names: Sequence[str] | None, r
     """
     source, names, joints = arm.name, mujoco_joint_names(model), mujoco_joints(model)
     wanted = list(arm.joint_names if joint_names is None else joint_names)
-    indices = [mujoco_id(model, "joint", name, source) for name in wanted]
+    indices = [mujoco_joint_id(names, name, source) for name in wanted]
     couplings = mujoco_couplings(model)
     held = held_with_arm(joints, couplings, arm, request, source)
     path = mujoco_bodies(model, int(model.jnt_bodyid[indices[-1]])) if indices else []
@@ -65,9 +64,9 @@ def parts_from_mujoco(model: Any, arm: Arm, joint_names: Sequence[str] | None, r
     check_independent(wanted, couplings, held, source)
     ranged = [[swept_range(joint, couplings, joints) for joint in of_body] for of_body in own]
     parts, axes = _skeleton(model, path, ranged, held)
-    pieces = names_of_pieces(RobotModel(source, parts, np.zeros(arm.dof), []), arm.dof)
+    pieces = [place.piece for place in places_of(parts, arm.dof)]
     parts = [
-        part._replace(geometry=tuple(_geometry(model, g) for g in _wanted(model, k, request) if not _is_flat(model, g)))
+        part._replace(geometry=_geometry_of_body(model, k, part.name, source, request))
         for k, part in enumerate(parts, start=1)
     ]
     reference = np.array([joints[name].rest for name in wanted])
@@ -88,7 +87,7 @@ def _skeleton(
     A body beside the path moves with the base if it hangs there by held joints, or below a held joint; other bodies
     without joints that hang on the base are obstacles.
     """
-    parts, axes, frame = [], {}, -1
+    parts, axes, frame, names = [], {}, -1, mujoco_body_names(model)
     below, based = {0: False}, set()
     for body in range(1, model.nbody):
         parent = int(model.body_parentid[body])
@@ -103,7 +102,7 @@ def _skeleton(
                 continue
             joint = _seen_from(after, joint)
             axes[joint.name] = (body - 1, joint.axis, joint.position)
-            others.insert(0, swept_joint(joint))
+            others.insert(0, joint)
         pose = pose @ after
         if body in path:
             frame += len(loose)
@@ -112,8 +111,7 @@ def _skeleton(
             index = -1
         if index == -1:
             based.add(body)
-        name = model.body(body).name
-        parts.append(BodyPart(name, parent - 1, pose, index, tuple(others), ()))
+        parts.append(BodyPart(names[body], parent - 1, pose, index, tuple(others), ()))
     return parts, axes
 
 
@@ -136,10 +134,11 @@ def _report(
 ) -> ModelReport:
     roots = {_root(parts, k) for k, piece in enumerate(pieces) if piece}
     beside, unseen, flat = [], [], []
+    around = ["the world"] if _wanted(model, 0, request) else []
     for k, (part, piece) in enumerate(zip(parts, pieces, strict=True)):
         geoms = _wanted(model, k + 1, request)
-        if not piece and geoms and _root(parts, k) in roots:
-            beside.append(part.name)
+        if not piece and geoms:
+            (beside if _root(parts, k) in roots else around).append(part.name)
         elif piece and not geoms and len(geoms_of(model, k + 1)):
             unseen.append(part.name)
         if piece and any(_is_flat(model, geom) for geom in geoms):
@@ -147,10 +146,15 @@ def _report(
     swept = [part.name for part, piece in zip(parts, pieces, strict=True) if part.joints and piece]
     lines = []
     if unseen:
-        lines.append(f"bodies whose geoms do not collide, which visuals=True would cover: {listed(unseen, SHOWN)}")
+        lines.append(f"{NOT_SOLID}, which visuals=True would cover: {listed(unseen, SHOWN)}")
     if flat:
         lines.append(f"planes and height fields on the arm, which its body does not contain: {listed(flat, SHOWN)}")
-    return ModelReport(source, held, (*unused_of_parts(beside, swept), *unused_of_mujoco(model)), tuple(lines))
+    unused = [*unused_of_parts(beside, swept), *unused_of_mujoco(model)]
+    if around:
+        unused.append(
+            f"bodies around the robot, which its body does not contain; make them obstacles: {listed(around)}"
+        )
+    return ModelReport(source, held, tuple(unused), tuple(lines))
 
 
 def _is_flat(model: Any, geom: int) -> bool:
@@ -162,6 +166,13 @@ def _root(parts: list[BodyPart], k: int) -> int:
     while parts[k].parent >= 0:
         k = parts[k].parent
     return k
+
+
+def _geometry_of_body(model: Any, body: int, name: str, source: str, request: PartsRequest) -> tuple[Geometry, ...]:
+    try:
+        return tuple(_geometry(model, geom) for geom in _wanted(model, body, request) if not _is_flat(model, geom))
+    except UnfitShape as error:
+        raise BadModel(source, f"body {name!r}", str(error)) from None
 
 
 def _geometry(model: Any, geom: int) -> Geometry:

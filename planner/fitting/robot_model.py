@@ -9,25 +9,8 @@ import numpy as np
 
 from ..geometry.hulls import Cover
 from ..geometry.pose import Pose
+from ..models.model_joints import ModelJoint
 from ..robot.joint_frames import moved
-
-
-class Joint(NamedTuple):
-    """A joint that does not belong to the arm, in the frame of its part.
-
-    Attributes:
-        kind: REVOLUTE, PRISMATIC or NaN for any other.
-        axis: (3,) unit.
-        position: (3,) a point on the axis [m].
-        low: lowest position relative to the reference [rad or m]; -inf without a limit.
-        high: highest position relative to the reference [rad or m]; inf without a limit.
-    """
-
-    kind: float
-    axis: np.ndarray
-    position: np.ndarray
-    low: float
-    high: float
 
 
 class Geometry(NamedTuple):
@@ -60,7 +43,7 @@ class BodyPart(NamedTuple):
     parent: int
     pose: Pose
     frame: int | None
-    joints: tuple[Joint, ...]
+    joints: tuple[ModelJoint, ...]
     geometry: tuple[Geometry, ...]
 
 
@@ -78,6 +61,44 @@ class RobotModel(NamedTuple):
     parts: list[BodyPart]
     reference: np.ndarray
     joints: list[tuple[int, np.ndarray, np.ndarray]]
+
+
+class PartPlace(NamedTuple):
+    """Place of a part in the body.
+
+    Attributes:
+        frame: index of the arm's joint whose frame the part moves with, -1 for the base's; None: not on the robot.
+        piece: name of its capsules, see `body_from_mujoco`; "" if it is not covered.
+        below: whether it hangs on another part that moves by joints that are not the arm's, and is swept with that one.
+        moving: whether it moves by such joints.
+    """
+
+    frame: int | None
+    piece: str
+    below: bool
+    moving: bool
+
+
+def places_of(parts: Sequence[BodyPart], dof: int) -> list[PartPlace]:
+    """Return the place of every part in the body.
+
+    Args:
+        parts: parents first.
+        dof: number of the arm's joints.
+    """
+    places: list[PartPlace] = []
+    for part in parts:
+        above = PartPlace(None, "", False, False) if part.parent < 0 else places[part.parent]
+        frame = above.frame if part.frame is None else part.frame
+        moving = above.moving or len(part.joints) > 0
+        if frame is None or (part.frame is None and frame == -1):
+            piece = ""
+        elif part.frame is None and frame == dof - 1:
+            piece = "fingers" if moving else "hand"
+        else:
+            piece = f"link{frame + 1}"
+        places.append(PartPlace(frame, piece, above.moving, moving))
+    return places
 
 
 def joined(geometries: Sequence[Geometry]) -> Geometry:

@@ -1,4 +1,4 @@
-"""Common parts of the readers of bodies: their request, their result, names of pieces, geometry of shapes."""
+"""Common parts of the readers of bodies: their request, their result, held joints, geometry of shapes."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import BadModel
 from ..geometry.capsule_cover import covering_capsules
 from ..geometry.hulls import corner_points
 from ..geometry.shapes import Capsule, Shape, Sphere
-from ..models.model_joints import SLIDES, TURNS, Coupling, ModelJoint, held_positions
+from ..models.model_joints import Coupling, ModelJoint, held_positions
 from ..models.model_report import ModelReport, listed
 from ..robot.arm import Arm
-from ..robot.kinematics import PRISMATIC, REVOLUTE
-from .robot_model import Geometry, Joint, RobotModel
+from .robot_model import Geometry, RobotModel, places_of
 
 
 class PartsRequest(NamedTuple):
@@ -50,36 +50,6 @@ def geometry_of(shape: Shape) -> Geometry:
     return Geometry([], corner_points(shape))
 
 
-def swept_joint(joint: ModelJoint) -> Joint:
-    """Return a joint that is not the arm's, with its range relative to rest."""
-    kind = {TURNS: REVOLUTE, SLIDES: PRISMATIC}.get(joint.kind, np.nan)
-    return Joint(kind, joint.axis, joint.position, joint.low - joint.rest, joint.high - joint.rest)
-
-
-def names_of_pieces(robot: RobotModel, dof: int) -> list[str]:
-    """Return for each part the name of its capsules, as `body_from_mujoco` describes; "" if it is not covered.
-
-    Args:
-        robot: the parts.
-        dof: number of the arm's joints.
-    """
-    owner: list[int | None] = []
-    moving: list[bool] = []
-    names = []
-    for part in robot.parts:
-        above, under = (None, False) if part.parent < 0 else (owner[part.parent], moving[part.parent])
-        owner.append(above if part.frame is None else part.frame)
-        moving.append(under or len(part.joints) > 0)
-        frame = owner[-1]
-        if frame is None or (part.frame is None and frame == -1):
-            names.append("")
-        elif part.frame is None and frame == dof - 1:
-            names.append("fingers" if moving[-1] else "hand")
-        else:
-            names.append(f"link{frame + 1}")
-    return names
-
-
 def pieces_of_links(read: ReadRobot, dof: int) -> dict[str, str]:
     """Return for each link, or body, that is covered and has geometry the name of its capsules.
 
@@ -87,8 +57,8 @@ def pieces_of_links(read: ReadRobot, dof: int) -> dict[str, str]:
         read: the robot.
         dof: number of the arm's joints.
     """
-    pieces = names_of_pieces(read.robot, dof)
-    return {link: piece for links, piece in zip(read.links, pieces, strict=True) if piece for link in links}
+    places = places_of(read.robot.parts, dof)
+    return {link: place.piece for links, place in zip(read.links, places, strict=True) if place.piece for link in links}
 
 
 def held_with_arm(
@@ -104,10 +74,13 @@ def held_with_arm(
         source: name of the model for messages.
 
     Raises:
-        BadModel: see `held_positions`.
+        BadModel: see `held_positions`; or a joint that the arm holds elsewhere.
     """
     followers = {coupling.follower for coupling in couplings}
     of_arm = {name: position for name, position in arm.report.held.items() if name not in followers}
+    for name in request.locked:
+        if name in of_arm and request.locked[name] != of_arm[name]:
+            raise BadModel(source, f"locked joint {name!r}", f"is held at {of_arm[name]:g} by the arm")
     return held_positions(joints, couplings, {**of_arm, **request.locked}, (), arm.joint_names, source)
 
 

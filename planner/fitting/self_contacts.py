@@ -22,6 +22,7 @@ from ..geometry.shapes import pack
 from ..jit import inner, kernel
 from ..robot.arm import Arm
 from ..robot.body import BODY, Body
+from ..robot.kinematics import CHAIN, REVOLUTE
 from .mesh_distances import MeshDistances
 
 POSTURES, TRIES, STARTS = 4000, 300, 5
@@ -30,6 +31,10 @@ TOUCH = 0.002
 """Distance [m] that two parts never fall below if they count as unable to touch: for a model's own inaccuracy."""
 NEAR, MOSTLY = 0.01, 0.95
 """Distance [m] below which two parts, in this share of all postures, count as resting against each other."""
+
+
+SHARE = 0.5
+"""Share of the distance of two parts in the median posture that they are asked to keep at most."""
 
 
 class Survey(NamedTuple):
@@ -89,11 +94,11 @@ def _descend(g, q, i, j, lower, upper, steps, trial):
 
 
 def _ranges(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper end of the joints' ranges, one turn at most."""
+    """Lower and upper end of the joints' ranges, of a joint that turns one turn at most."""
     turn = math.pi
     lower = np.where(np.isfinite(arm.lower), arm.lower, -turn)
     upper = np.where(np.isfinite(arm.upper), arm.upper, turn)
-    wide = upper - lower > 2.0 * turn
+    wide = (upper - lower > 2.0 * turn) & (arm.chain[:-1, CHAIN.kind] == REVOLUTE)
     return np.where(wide, -turn, lower), np.where(wide, turn, upper)
 
 
@@ -118,7 +123,8 @@ def survey_of(arm: Arm, body: Body, count: int = POSTURES) -> Survey:
 def possible_contacts(arm: Arm, body: Body, truth: MeshDistances) -> Body:
     """Return a body with the pairs of its capsules that can hit each other.
 
-    Neighboring links are left out: the joint between them keeps them apart.
+    Neighboring links are left out: the joint between them keeps them apart. Parts that pass close by each other in
+    ordinary postures get a margin of their own, which those postures keep.
 
     Args:
         arm: the arm.
@@ -129,6 +135,7 @@ def possible_contacts(arm: Arm, body: Body, truth: MeshDistances) -> Body:
     least = survey.distances.min(axis=0)
     rng, work = np.random.default_rng(1), robot_arrays((arm,), (body,), pack(()))
     kept: list[tuple[int, int]] = []
+    margins: dict[tuple[int, int], float] = {}
     for names, indices in survey.by_parts(body).items():
         if (survey.distances[:, indices] < NEAR).any(axis=1).mean() >= MOSTLY:
             continue
@@ -140,8 +147,12 @@ def possible_contacts(arm: Arm, body: Body, truth: MeshDistances) -> Body:
             touch = _least_truth(arm, truth, names, survey.postures[np.argsort(near)[:STARTS]], rng) <= TOUCH
         if touch:
             # the others of these parts count too where they come close, so that the distance of the parts is right
-            kept += [(int(i), int(j)) for i, j in survey.pairs[indices[least[indices] <= CLOSE]]]
-    return replace(body, pairs=tuple(sorted(kept)))
+            pairs = [(int(i), int(j)) for i, j in survey.pairs[indices[least[indices] <= CLOSE]]]
+            kept += pairs
+            usual = SHARE * float(np.median(survey.distances[:, indices].min(axis=1)))
+            if usual < CLOSE:
+                margins |= dict.fromkeys(pairs, max(usual, 0.0))
+    return replace(body, pairs=tuple(sorted(kept)), margins=margins)
 
 
 def _least(arm: Arm, survey: Survey, work: np.ndarray, k: int, rng: np.random.Generator) -> float:

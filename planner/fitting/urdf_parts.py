@@ -11,23 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadModel
+from ..errors import BadModel, UnfitShape
 from ..geometry.pose import Pose
 from ..geometry.shapes import Box, Capsule, Cylinder, Sphere
 from ..models.model_joints import check_independent, swept_range
-from ..models.model_report import SHOWN, ModelReport, listed
+from ..models.model_report import ONLY_SEEN, SHOWN, ModelReport, listed
 from ..models.urdf_model import UrdfModel, read_urdf
 from ..robot.arm import Arm
 from ..robot.chain_readers import turn_z_to
 from ..robot.joint_frames import joint_frames
-from .robot_model import BodyPart, Geometry, RobotModel, placed
+from .robot_model import BodyPart, Geometry, RobotModel, placed, places_of
 from .robot_parts import (
     PartsRequest,
     ReadRobot,
     geometry_of,
     held_with_arm,
-    names_of_pieces,
-    swept_joint,
     unused_of_parts,
 )
 
@@ -59,7 +57,7 @@ def parts_from_urdf(
         first = model.placement(joint) @ joints[name].motion(held[name]) @ first
     world_from_root = joint_frames(arm, np.zeros(arm.dof))[0] @ first.inverse()
     skeleton, links = _skeleton(model, chain, held, world_from_root, request)
-    pieces = names_of_pieces(RobotModel(source, skeleton, np.zeros(arm.dof), []), arm.dof)
+    pieces = [place.piece for place in places_of(skeleton, arm.dof)]
     covered = {name for names, piece in zip(links, pieces, strict=True) if piece for name in names}
     geometry = _geometry_of_links(model, package_dirs, covered, request)
     parts = [
@@ -110,7 +108,7 @@ def _skeleton(
         elif joint in chain:
             frame = chain.index(joint)
         else:
-            others = (swept_joint(swept_range(joints[name], model.file.couplings, joints)),)
+            others = (swept_range(joints[name], model.file.couplings, joints),)
         parts.append(BodyPart(name, parent, pose, frame, others, ()))
     for name, joint in welded:
         frame = -1 if joint in based else None
@@ -137,7 +135,14 @@ def _geometry_of_links(
         name = model.pinocchio.frames[item.parentFrame].name
         if name in covered and visual == (name in unseen):
             pose = Pose.from_matrix(item.placement.homogeneous)
-            found.setdefault(name, []).append(placed(pose, _geometry(item, model.source)))
+            found.setdefault(name, []).append(placed(pose, _geometry(item, name, model.source)))
+    for name in covered:
+        link = model.file.links[name]
+        wanted = link.visuals if name in unseen and request.visuals else link.collisions
+        if len(found.get(name, ())) != wanted:
+            readable = f"{len(found.get(name, ()))} of its {wanted} elements of geometry can be read"
+            reason = f"only {readable}; is its <inertial>, or a <visual> of it, broken?"
+            raise BadModel(model.source, f"link {name!r}", reason)
     if not found:
         hint = "; visuals=True covers what is to be seen" if unseen else ""
         raise BadModel(model.source, "collision geometry", f"no link has a <collision> element{hint}")
@@ -156,14 +161,22 @@ def _report(
     links = model.file.links
     beside = [name for name, link in links.items() if name not in covered and (link.collisions or link.visuals)]
     unseen = [] if request.visuals else _unseen(model, covered)
-    line = f"links with a <visual> and no <collision>, which visuals=True would cover: {listed(unseen, SHOWN)}"
+    line = f"{ONLY_SEEN}, which visuals=True would cover: {listed(unseen, SHOWN)}"
     unused = (*unused_of_parts(beside, swept), *model.file.unused)
     return ModelReport(str(model.source), held, unused, (line,) if unseen else ())
 
 
-def _geometry(item: Any, source: Path) -> Geometry:
-    """Return the geometry of an element in its own frame; hpp-fcl and coal use the same class names."""
-    form, name = item.geometry, type(item.geometry).__name__
+def _geometry(item: Any, link: str, source: Path) -> Geometry:
+    """Return the geometry of a link's element in its own frame."""
+    try:
+        return _geometry_of_form(item.geometry)
+    except UnfitShape as error:
+        raise BadModel(source, f"link {link!r}", str(error)) from None
+
+
+def _geometry_of_form(form: Any) -> Geometry:
+    """Return the geometry of an object of hpp-fcl or coal, which use the same class names."""
+    name = type(form).__name__
     if name == "Sphere":
         return geometry_of(Sphere(form.radius))
     if name == "Capsule":
@@ -179,4 +192,4 @@ def _geometry(item: Any, source: Path) -> Geometry:
         return Geometry([], vertices, vertices[np.array(corners, dtype=int)])
     if name == "Convex":
         return Geometry([], np.array([form.point(k) for k in range(form.num_points)], dtype=np.float64))
-    raise BadModel(source, item.name, f"is a {name}; known are boxes, balls, capsules, cylinders and meshes")
+    raise UnfitShape(name, "kind", "known are boxes, balls, capsules, cylinders and meshes")

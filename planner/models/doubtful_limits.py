@@ -20,8 +20,8 @@ FAST = 8.0 * math.pi
 """Largest plausible speed of a revolute joint [rad/s]."""
 FAR = 10.0
 """Largest plausible limit of a prismatic joint [m]."""
-SMALL = math.radians(TURN)
-"""A limit of one turn in radians, if taken for degrees [rad]."""
+SMALL = math.radians(7.0)
+"""A limit of one turn in radians, if taken for degrees, and a little more [rad]."""
 
 
 def check_limits(joints: Sequence[ModelJoint], source: str) -> None:

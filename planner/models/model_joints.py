@@ -107,24 +107,35 @@ def held_positions(
     held: dict[str, float] = {}
     patterns = [key for key in locked if key not in joints]
     for pattern in patterns:
-        matched = [name for name in joints if fnmatchcase(name, pattern) and name not in {*leader_of, *own}]
+        matched = [name for name in joints if fnmatchcase(name, pattern)]
         if not matched:
             raise BadModel(source, f"locked joint {pattern!r}", f"not in the model; joints: {', '.join(joints)}")
-        held |= {name: _allowed(joints[name], locked[pattern], source) for name in matched if name not in locked}
+        free_ones = [name for name in matched if name not in leader_of and name not in own]
+        if not free_ones:
+            reason = f"matches only joints of the arm, or joints that follow others: {', '.join(matched)}"
+            raise BadModel(source, f"locked joint {pattern!r}", reason)
+        held |= {name: _allowed(joints[name], locked[pattern], source) for name in free_ones if name not in locked}
     for name in (key for key in locked if key in joints):
         if name in own:
             raise BadModel(source, f"locked joint {name!r}", "is a joint of the arm")
-        if name in leader_of and leader_of[name].leader:
-            raise BadModel(source, f"locked joint {name!r}", f"follows {leader_of[name].leader!r}: lock that one")
+        if name in leader_of:
+            raise BadModel(source, f"locked joint {name!r}", _why_not_locked(leader_of[name]))
         held[name] = _allowed(joints[name], locked[name], source)
     for name in before_base:
         if name not in held and name not in leader_of:
             held[name] = min(max(joints[name].rest, joints[name].low), joints[name].high)
     for _ in couplings:  # a follower may lead another one
-        for follower, leader, _ in couplings:
-            if follower in joints and (leader in held or not leader):
-                held[follower] = leader_of[follower].at(held.get(leader, 0.0))
+        for coupling in couplings:
+            if coupling.leader in held or not coupling.leader:
+                held[coupling.follower] = coupling.at(held.get(coupling.leader, 0.0))
     return {name: held[name] for name in joints if name in held}
+
+
+def _why_not_locked(coupling: Coupling) -> str:
+    """Say why a joint that follows another one cannot be locked by itself."""
+    if coupling.leader:
+        return f"follows {coupling.leader!r}: lock that one"
+    return f"stands still at {coupling.at(0.0):g}, where the model couples it"
 
 
 def _allowed(joint: ModelJoint, value: float, source: str) -> float:
@@ -170,12 +181,23 @@ def swept_range(joint: ModelJoint, couplings: Iterable[Coupling], joints: Mappin
         couplings: joints that follow others.
         joints: all joints, by name.
     """
+    return _swept_range(joint, tuple(couplings), joints, ())
+
+
+def _swept_range(
+    joint: ModelJoint, couplings: tuple[Coupling, ...], joints: Mapping[str, ModelJoint], asked: tuple[str, ...]
+) -> ModelJoint:
+    """Return a joint with the range that it may take; `asked`: the joints that follow it, whose range is wanted."""
+    ranges: list[tuple[float, float]] = []
     for coupling in couplings:
-        leader = joints.get(coupling.leader)
-        if coupling.follower == joint.name and leader is not None and math.isfinite(leader.high - leader.low):
-            low, high = coupling.range(leader.low, leader.high)
-            limited = math.isfinite(joint.high - joint.low)
-            return joint._replace(
-                low=min(low, joint.low) if limited else low, high=max(high, joint.high) if limited else high
-            )
-    return joint
+        if coupling.follower == joint.name and coupling.leader in joints and coupling.leader not in asked:
+            leader = _swept_range(joints[coupling.leader], couplings, joints, (*asked, joint.name))
+            if math.isfinite(leader.high - leader.low):
+                ranges.append(coupling.range(leader.low, leader.high))
+            elif joint.kind == TURNS:
+                ranges.append((-math.inf, math.inf))
+    if not ranges:
+        return joint
+    if math.isfinite(joint.high - joint.low):
+        ranges.append((joint.low, joint.high))
+    return joint._replace(low=min(low for low, _ in ranges), high=max(high for _, high in ranges))

@@ -11,6 +11,11 @@ from ..errors import ModelWarning
 SHOWN = 8
 """Number of names that a warning lists; the report lists all."""
 
+ONLY_SEEN = "links with a <visual> and no <collision>"
+NOT_SOLID = "bodies whose geoms do not collide"
+UNSEEN = (ONLY_SEEN, NOT_SOLID)
+"""Beginnings of the lines about geometry that only `visuals` covers."""
+
 
 @dataclass(frozen=True, slots=True)
 class ModelReport:

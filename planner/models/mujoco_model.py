@@ -5,7 +5,7 @@ MuJoCo itself is not imported.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.polynomial import Polynomial
 from ..errors import BadModel
 from ..geometry.pose import Pose
 from .model_joints import OTHER, SLIDES, TURNS, Coupling, ModelJoint
+from .model_report import SHOWN, listed
 
 KINDS = {2: SLIDES, 3: TURNS}
 """mjJNT_SLIDE and mjJNT_HINGE."""
@@ -54,7 +55,7 @@ def mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
 
     Args:
         model: `mujoco.MjModel`.
-        kind: "joint", "site" …
+        kind: "site" or "body".
         name: of the element.
         source: name of the model for messages.
 
@@ -64,7 +65,8 @@ def mujoco_id(model: Any, kind: str, name: str, source: str) -> int:
     try:
         return int(getattr(model, kind)(name).id)
     except KeyError:
-        raise BadModel(source, f"{kind} {name!r}", "not in the model") from None
+        names = [getattr(model, kind)(k).name for k in range(int(getattr(model, f"n{kind}")))]
+        raise BadModel(source, f"{kind} {name!r}", f"not in the model; known: {listed(names, 3 * SHOWN)}") from None
 
 
 def mujoco_bodies(model: Any, body: int) -> list[int]:
@@ -81,10 +83,32 @@ def mujoco_bodies(model: Any, body: int) -> list[int]:
     return path[::-1]
 
 
+def mujoco_body_names(model: Any) -> list[str]:
+    """Return the names of all bodies; those without are told apart by their index."""
+    return [model.body(k).name or f"(body {k}, without a name)" for k in range(int(model.nbody))]
+
+
 def mujoco_joint_names(model: Any) -> list[str]:
-    """Return the names of all joints; those without are named after their body."""
-    bodies = [model.body(int(body)).name for body in model.jnt_bodyid]
-    return [model.joint(k).name or f"(joint of {body}, without a name)" for k, body in enumerate(bodies)]
+    """Return the names of all joints; those without are named after their body, and told apart by their index."""
+    bodies = mujoco_body_names(model)
+    owners = [bodies[int(body)] for body in model.jnt_bodyid]
+    return [model.joint(k).name or f"(joint {k}, of {body}, without a name)" for k, body in enumerate(owners)]
+
+
+def mujoco_joint_id(names: Sequence[str], name: str, source: str) -> int:
+    """Return the index of a joint.
+
+    Args:
+        names: of all joints, see `mujoco_joint_names`.
+        name: of the joint.
+        source: name of the model for messages.
+
+    Raises:
+        BadModel: the model lacks the joint.
+    """
+    if name not in names:
+        raise BadModel(source, f"joint {name!r}", f"not in the model; joints: {listed(names, 3 * SHOWN)}")
+    return names.index(name)
 
 
 def mujoco_joint(model: Any, index: int, name: str) -> ModelJoint:
@@ -124,7 +148,7 @@ def mujoco_couplings(model: Any) -> tuple[Coupling, ...]:
 
 def mujoco_loops(model: Any) -> list[Loop]:
     """Return the active constraints that tie two bodies together."""
-    loops = []
+    loops, bodies = [], mujoco_body_names(model)
     for k in _active(model):
         if int(model.eq_type[k]) not in (CONNECT, WELD):
             continue
@@ -133,7 +157,7 @@ def mujoco_loops(model: Any) -> list[Loop]:
             ends = [int(model.site_bodyid[end]) for end in ends]
         first, second = (max(end, 0) for end in ends)
         kind = "connect" if int(model.eq_type[k]) == CONNECT else "weld"
-        names = " and ".join(model.body(end).name for end in (first, second))
+        names = " and ".join(bodies[end] for end in (first, second))
         mocap = bool((model.body_mocapid[[first, second]] >= 0).any())
         loops.append(Loop(f"<{kind}> of {names}", (first, second), mocap))
     return loops
@@ -167,8 +191,12 @@ def unused_of_mujoco(model: Any) -> Iterator[str]:
         yield f"equalities of tendons or flexes: {len(others)}"
     if int(model.nexclude):
         yield f"pairs of bodies without contact (<exclude>): {int(model.nexclude)}"
+    if int(model.npair):
+        yield f"pairs of geoms with contact of their own (<pair>): {int(model.npair)}"
     if int(model.ntendon):
         yield f"tendons: {int(model.ntendon)}"
+    if flexes := int(getattr(model, "nflex", 0)):
+        yield f"flexes: {flexes}"
 
 
 def _active(model: Any) -> list[int]:

@@ -22,6 +22,8 @@ def read_srdf(path: str | Path) -> dict[LinkPair, str]:
     if not source.is_file():
         raise BadModel(source, "SRDF", "no such file")
     robot = parsed_xml(source, "SRDF")
+    if robot.find("link") is not None:
+        raise BadModel(source, "SRDF", "is none: it has <link> elements, like a URDF")
     pairs = {}
     for k, element in enumerate(robot.iter("disable_collisions")):
         names = sorted((element.get("link1") or "", element.get("link2") or ""))

@@ -17,6 +17,8 @@ from .xml_tree import parsed_xml
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 FORMS = {"box": "size", "cylinder": "radius length", "sphere": "radius", "mesh": "filename"}
 """Kinds of geometry, and the attributes each must have."""
+SCHEMES = ("package", "file")
+"""Schemes of the addresses of meshes; an address without one is a path."""
 
 
 class UrdfLink(NamedTuple):
@@ -58,14 +60,14 @@ def read_urdf_file(path: str | Path) -> UrdfFile:
 
     Raises:
         BadModel: no such file, no URDF, unexpanded xacro, two of one name, a joint without the limits it needs, links
-            that are no tree, or a joint that mimics itself.
+            that are no tree, or a joint that mimics itself or none.
     """
     source = Path(path)
     if not source.is_file():
         raise BadModel(source, "URDF", "no such file")
     robot = _parsed(source)
     links, joints = robot.findall("link"), robot.findall("joint")
-    for element in (*links, *joints):
+    for element in (robot, *links, *joints):
         if not element.get("name"):
             raise BadModel(source, element.tag, "one has no name")
     for kind, found in (("link", links), ("joint", joints)):
@@ -101,6 +103,12 @@ def _check_joint(source: Path, joint: Element) -> None:
     key, kind, limit = f"joint {joint.get('name')!r}", joint.get("type"), joint.find("limit")
     if kind not in TYPES:
         raise BadModel(source, key, f"its type is {kind!r}; known are {', '.join(TYPES)}")
+    fault = _origin_fault(joint) or _vector_fault(joint, "axis", "xyz")
+    for name in ("effort", "velocity"):
+        if limit is not None and math.isnan(_number(limit.get(name, "0"))):
+            fault = fault or f"the {name} {limit.get(name)!r} of its <limit> is no number"
+    if fault:
+        raise BadModel(source, key, fault)
     if kind not in ("revolute", "prismatic"):
         return
     if limit is None:
@@ -109,6 +117,10 @@ def _check_joint(source: Path, joint: Element) -> None:
     missing = [name for name in ("effort", "velocity") if limit.get(name) is None]
     if missing:
         raise BadModel(source, key, f"its <limit> has no {' and no '.join(missing)}; a <limit> needs both")
+    texts = [limit.get(name, "0") for name in ("lower", "upper")]
+    low, high = map(_number, texts)
+    if not (low <= high and math.isfinite(high - low)):
+        raise BadModel(source, key, f"its limits are {texts[0]!r} and {texts[1]!r}, not two numbers in order")
 
 
 def _check_tree(source: Path, links: list[str], joints: list[Element]) -> None:
@@ -128,6 +140,11 @@ def _check_tree(source: Path, links: list[str], joints: list[Element]) -> None:
     roots = [link for link in links if link not in parents]
     if len(roots) != 1:
         raise BadModel(source, "links", f"there must be one root, but there are {len(roots)}: {listed(roots, 8)}")
+    hanging = {*roots}
+    for _ in links:
+        hanging |= {child for child, parent in parents.items() if parent in hanging}
+    if loose := [link for link in links if link not in hanging]:
+        raise BadModel(source, "links", f"these hang in a circle, not on {roots[0]!r}: {listed(loose, 8)}")
 
 
 def _link(link: Element) -> UrdfLink:
@@ -137,7 +154,9 @@ def _link(link: Element) -> UrdfLink:
 
 
 def _fault(element: Element) -> str:
-    """Return what is wrong with the geometry of an element, for which Pinocchio would drop it; "" for nothing."""
+    """Return what is wrong with an element of a link, for which Pinocchio would drop it; "" for nothing."""
+    if fault := _origin_fault(element):
+        return fault
     geometry = element.find("geometry")
     forms = [] if geometry is None else list(geometry)
     if len(forms) != 1:
@@ -149,6 +168,8 @@ def _fault(element: Element) -> str:
         text = form.get(name, "")
         if name == "filename" and not text:
             return "a mesh has no filename"
+        if name == "filename" and "://" in text and text.partition("://")[0] not in SCHEMES:
+            return f"the mesh {text!r} is not at a path, at package:// or at file://"
         if name != "filename" and not _positive(text, 3 if name == "size" else 1):
             return f"the {name} {text!r} of its <{form.tag}> is not positive"
     if not _positive(form.get("scale", "1 1 1"), 3, signed=True):
@@ -156,16 +177,36 @@ def _fault(element: Element) -> str:
     return ""
 
 
+def _origin_fault(element: Element) -> str:
+    """Return what is wrong with the numbers of an element's <origin>; "" for nothing."""
+    return _vector_fault(element, "origin", "xyz") or _vector_fault(element, "origin", "rpy")
+
+
+def _vector_fault(element: Element, tag: str, name: str) -> str:
+    child = element.find(tag)
+    text = None if child is None else child.get(name)
+    numbers = [_number(word) for word in (text or "0 0 0").split()]
+    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
+        return ""
+    return f"the {name} {text!r} of the <{tag}> of a <{element.tag}> is not three numbers"
+
+
 def _positive(text: str, count: int, *, signed: bool = False) -> bool:
-    try:
-        numbers = [float(word) for word in text.split()]
-    except ValueError:
-        return False
+    numbers = [_number(word) for word in text.split()]
     return len(numbers) == count and all(math.isfinite(x) and (x > 0 or (signed and x < 0)) for x in numbers)
 
 
+def _number(text: str) -> float:
+    """Return the number that a text holds; NaN if it holds something else."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def _couplings(source: Path, joints: list[Element]) -> tuple[Coupling, ...]:
-    fixed = {joint.get("name") for joint in joints if joint.get("type") == "fixed"}
+    known = {joint.get("name", ""): joint for joint in joints}
+    fixed = {name for name, joint in known.items() if joint.get("type") == "fixed"}
     leaders: dict[str, str] = {}
     found = []
     for joint in joints:
@@ -173,10 +214,9 @@ def _couplings(source: Path, joints: list[Element]) -> tuple[Coupling, ...]:
         if mimic is None or name in fixed:
             continue
         leader = mimic.get("joint", "")
-        try:
-            numbers = float(mimic.get("offset", 0.0)), float(mimic.get("multiplier", 1.0))
-        except ValueError:
-            numbers = (math.nan, math.nan)
+        if leader not in known:
+            raise BadModel(source, f"joint {name!r}", f"mimics {leader!r}, which is no joint")
+        numbers = _number(mimic.get("offset", "0")), _number(mimic.get("multiplier", "1"))
         if not all(map(math.isfinite, numbers)):
             raise BadModel(source, f"joint {name!r}", "the multiplier or the offset of its <mimic> is not a number")
         stands = numbers[1] == 0.0 or leader in fixed
@@ -186,7 +226,7 @@ def _couplings(source: Path, joints: list[Element]) -> tuple[Coupling, ...]:
         seen, leader = {name}, leaders[name]
         while leader in leaders:
             if leader in seen:
-                raise BadModel(source, f"joint {name!r}", "mimics itself")
+                raise BadModel(source, f"joint {leader!r}", "mimics itself")
             seen.add(leader)
             leader = leaders[leader]
     return tuple(found)

@@ -110,6 +110,9 @@ def read_urdf(path: str | Path) -> UrdfModel:
     except (ValueError, RuntimeError) as error:
         raise BadModel(file.source, "URDF", f"cannot be read: {str(error).splitlines()[0]}") from None
     data, neutral = model.createData(), pin.neutral(model)
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY and frame.name not in file.links:
+            raise BadModel(file.source, f"link {frame.name!r}", "its name holds a line break or a tab")
     joints = [_joint(model, index, data, neutral) for index in range(1, model.njoints)]
     return UrdfModel(file, model, {joint.name: joint for joint in joints})
 

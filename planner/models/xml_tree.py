@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from ..errors import BadModel
+
+COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+ROOT = re.compile(rb"<([A-Za-z_][^\s/>]*)")
 
 
 def parsed_xml(source: Path, kind: str) -> Element:
@@ -25,8 +29,24 @@ def parsed_xml(source: Path, kind: str) -> Element:
     try:
         parser.Parse(source.read_bytes(), True)
         robot = builder.close()
-    except (expat.ExpatError, OSError) as error:
+    except (expat.ExpatError, OSError, ValueError, LookupError) as error:  # the last two: encodings
         raise BadModel(source, kind, f"cannot be read: {error}") from None
     if robot.tag != "robot":
         raise BadModel(source, kind, f"is none: its root is <{robot.tag}>, not <robot>")
     return robot
+
+
+def root_of(source: Path) -> str:
+    """Return the name of a file's root element, also if the file is not well-formed; "" if it has none.
+
+    Args:
+        source: the file. Loaders of models are less strict than XML, about dashes in comments for example.
+
+    Raises:
+        BadModel: the file cannot be read.
+    """
+    try:
+        found = ROOT.search(COMMENT.sub(b"", source.read_bytes()))
+    except OSError as error:
+        raise BadModel(source, "robot", f"cannot be read: {error.strerror or error}") from None
+    return "" if found is None else found.group(1).decode(errors="replace")

@@ -12,12 +12,14 @@ from ..errors import BadModel
 from ..geometry.pose import Pose
 from ..models.doubtful_limits import check_limits, doubtful_limits
 from ..models.model_joints import OTHER, SLIDES, ModelJoint, check_independent, held_positions
-from ..models.model_report import SHOWN, ModelReport, listed
+from ..models.model_report import NOT_SOLID, ONLY_SEEN, SHOWN, ModelReport, listed
 from ..models.mujoco_model import (
     geoms_of,
     mujoco_bodies,
+    mujoco_body_names,
     mujoco_couplings,
     mujoco_id,
+    mujoco_joint_id,
     mujoco_joint_names,
     mujoco_joints,
     mujoco_loops,
@@ -135,7 +137,7 @@ def chain_from_mujoco(
     last = tool_id if tool[0] == "body" else int(model.site_bodyid[tool_id])
     path, joints, names = mujoco_bodies(model, last), mujoco_joints(model), mujoco_joint_names(model)
     for name in joint_names or ():
-        mujoco_id(model, "joint", name, source)
+        mujoco_joint_id(names, name, source)
     before: list[str] = []
     if request.base_link is not None:
         base = mujoco_id(model, "body", request.base_link, source)
@@ -209,7 +211,7 @@ def chain_from_urdf(
     moving = [joint for joint, name in zip(path_joints, names, strict=True) if name not in held]
     speeds = model.pinocchio.velocityLimit[[model.pinocchio.joints[joint].idx_v for joint in moving]]
     unseen = [link.name for link in model.file.links.values() if link.visuals and not link.collisions]
-    unused = [f"links with a <visual> and no <collision>: {listed(unseen)}"] if unseen else []
+    unused = [f"{ONLY_SEEN}: {listed(unseen)}"] if unseen else []
     warnings = tuple(doubtful_limits(builder.joints, speeds))
     return builder.data(speeds, ModelReport(str(model.source), held, (*unused, *model.file.unused), warnings))
 
@@ -253,5 +255,7 @@ def _ranges_without_force(model: Any, chain: Iterable[str]) -> list[str]:
 
 def _unsolid(model: Any) -> list[str]:
     """Return a line on the bodies of which no geom collides, though they have some."""
-    bodies = [k for k in range(1, model.nbody) if len(geoms_of(model, k)) and not solid_geoms(model, k)]
-    return [f"bodies whose geoms do not collide: {listed(model.body(k).name for k in bodies)}"] if bodies else []
+    names = [
+        name for k, name in enumerate(mujoco_body_names(model)) if len(geoms_of(model, k)) and not solid_geoms(model, k)
+    ]
+    return [f"{NOT_SOLID}: {listed(names)}"] if names else []

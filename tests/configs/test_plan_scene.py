@@ -76,6 +76,10 @@ BAD = {
         GOOD + "robot: {mjcf: x, tool: y}\n",
         "robot.velocity_limits: is missing: MJCF has no speed",
     ),
+    "speeds a word": (
+        GOOD + "robot: {urdf: x, tool: y, velocity_limits: fast}\n",
+        "robot.velocity_limits: must be a number, or a list of one per joint, got 'fast'",
+    ),
     "packages of MJCF": (
         GOOD + "robot: {mjcf: x, tool: y, velocity_limits: [1], package_dirs: [a]}\n",
         "robot.package_dirs: is for a URDF",

@@ -14,11 +14,11 @@ from onedemo.bench.mbm import command
 from onedemo.bench.mbm.command import Track, chosen, prepared, run_mbm
 from onedemo.bench.mbm.mesh_judge import MeshJudge, densely, pairs_of_links
 from onedemo.bench.mbm.problems import Problem, read_problems
-from onedemo.bench.mbm.robot import RobotFiles, pose_numbers, robot_files
+from onedemo.bench.mbm.robot import RobotFiles, pose_numbers, robot_files, widened
 from onedemo.bench.mbm.solvers import OURS, Answer
 from onedemo.bench.mbm.table import is_unsound, page, row_of, summaries
 from onedemo.configs.errors import BadConfig
-from onedemo.planner.errors import UnknownName
+from onedemo.planner.errors import BadModel, UnknownName
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Obstacle, Sphere
 
@@ -168,6 +168,19 @@ def test_the_judge_sees_own_parts_and_open_fingers(judge):
     assert judge.first_contact(np.zeros((1, 3)), at_finger).link == "finger"
 
 
+def test_the_judge_places_joints_that_turn_without_end(files, tmp_path):
+    """Pinocchio describes them by cosine and sine."""
+    endless = RobotFiles(tmp_path / "endless.urdf", None, "tip", Pose.identity())
+    text = files.urdf.read_text().replace('name="j_two" type="revolute"', 'name="j_two" type="continuous"')
+    endless.urdf.write_text(text)
+    judge = MeshJudge(prepared(endless, PROBLEMS[:1])[0])
+    for turn in (0.0, 1.0, -2.5):
+        at = 0.3 + 0.2 * math.cos(turn), 0.2 * math.sin(turn)
+        contact = judge.first_contact(np.array([[0.0, turn, 0.0]]), [ball(*at, radius=0.01)])
+        assert contact is not None and (contact.link, contact.other) == ("two", "ball")
+        assert judge.first_contact(np.array([[0.0, turn + 0.4, 0.0]]), [ball(*at, radius=0.01)]) is None
+
+
 @for_all(st.lists(st.tuples(*[st.floats(-3, 3)] * 2), min_size=1, max_size=6), st.floats(0.01, 1), max_examples=50)
 def test_between_dense_points_no_joint_moves_more_than_a_step(points, step):
     joints = np.array(points)
@@ -199,6 +212,19 @@ def test_limits_are_widened_to_the_problems_and_said(files):
     assert [note for note in notes if "j_one: the file's upper limit 2 is widened to 2.25" in note]
     with pytest.raises(BadConfig, match=r"plane 4: slide: stands at 0.01, in the first problem at 0.05"):
         prepared(files, [*PROBLEMS, problem(4, (0.0, 0.0, 0.0), slide=0.01)])
+
+
+def test_a_file_with_prefixes_that_nobody_declared_is_widened(files, tmp_path):
+    path = tmp_path / "flat.urdf"
+    path.write_text(files.urdf.read_text().replace("</robot>", "<sensor:camera/></robot>"))
+    text, notes = widened(path, {"j_one": (-1.0, 2.5)})
+    assert len(notes) == 1 and 'upper="2.5"' in text and "<sensor:camera" in text
+    path.write_text(text.replace('lower="-2"', 'lower="x"'))
+    with pytest.raises(BadModel, match=r"flat\.urdf: joint 'j_\w+': its limits are 'x' and '2"):
+        widened(path, {"j_two": (-3.0, 3.0)})
+    path.write_text("<robot")
+    with pytest.raises(BadModel, match=r"flat\.urdf: URDF: cannot be read"):
+        widened(path, {})
 
 
 def test_scenes_are_chosen_by_name():

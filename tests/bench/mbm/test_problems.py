@@ -87,11 +87,43 @@ def test_an_archive_is_read_as_moveit_means_it(tmp_path):
         (members(request=REQUEST.replace("0.065]", "]")), "is no scene and request"),
         (members(request="start_state: 3"), "is no scene and request"),
         (members(scene=SCENE.replace("robot_state: {}", "robot_state: {attached_collision_objects: [1]}")), "attached"),
+        (members(scene=SCENE.replace("robot_state:", "  octomap: {octomap: {data: [1]}}\nrobot_state:")), "octomap"),
+        (members(scene=SCENE.replace("[0, 0, 0, 2]", "[0, 0, 0, 0]")), r"top_shelf 7: .*orientation \[0, 0, 0, 0\]"),
+        (
+            members(scene=SCENE.replace("[0.3, 0.05]", "[0.3, 0]")),
+            r"top_shelf 7: cylinder: radius: 0\.0 is not a length",
+        ),
+        (members(scene=SCENE.replace("world:", "world: [1]\nsome:")), "top_shelf 7: is no scene and request"),
+        (members(request=REQUEST.replace("position: 2", "position: .nan")), "top_shelf 7: b stands at nan"),
     ],
 )
 def test_what_is_not_understood_is_refused_in_one_line(broken, words, tmp_path):
     with pytest.raises(OneDemoError, match=words) as caught:
         read_archive(archive(tmp_path / "some.tar.bz2", broken))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_without_a_state_of_the_robot_is_read(tmp_path):
+    scene = SCENE.replace("robot_state: {}", "robot_state:")
+    (problem,) = read_archive(archive(tmp_path / "some.tar.bz2", members(scene=scene)))
+    assert len(problem.obstacles) == 3
+
+
+@pytest.mark.parametrize("mode", ["gz", "bz2", "xz"])
+@pytest.mark.parametrize("damage", ["cut", "spoilt"])
+def test_a_damaged_archive_is_refused_in_one_line(mode, damage, tmp_path):
+    rng, path = np.random.default_rng(0), tmp_path / f"some.tar.{mode}"
+    noise = {f"noise{k}": rng.bytes(500).hex() for k in range(9)}
+    with tarfile.open(path, f"w:{mode}") as out:
+        for name, text in {**noise, **members()}.items():
+            info, data = tarfile.TarInfo(name), text.encode()
+            info.size = len(data)
+            out.addfile(info, io.BytesIO(data))
+    whole = path.read_bytes()
+    third = len(whole) // 3
+    path.write_bytes(whole[:third] if damage == "cut" else whole[:third] + bytes(64) + whole[third + 64 :])
+    with pytest.raises(BadConfig, match=rf"some\.tar\.{mode}: ") as caught:
+        read_archive(path)
     assert "\n" not in str(caught.value)
 
 

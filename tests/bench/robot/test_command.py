@@ -12,9 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onedemo.bench.cli import main
-from onedemo.bench.robot.load_robot import RobotRequest, load_robot
-from onedemo.bench.robot.robot_summary import reach_of, volumes_of
+from onedemo.bench.robot.load_robot import RobotRequest, kind_of, load_robot
+from onedemo.bench.robot.robot_summary import postures_of, reach_of, volumes_of
 from onedemo.bench.robot.tool_choice import end_of_chain, tool_of_mujoco
+from onedemo.planner import Arm
+from onedemo.planner.errors import BadModel
 from onedemo.planner.geometry.hulls import union_volume
 
 BOX = '<box size="0.06 0.1 0.4"/>'
@@ -78,7 +80,7 @@ def test_everything_is_printed_and_drawn(monkeypatch, capsys, tmp_path):
         assert words in out, words
     assert picture.stat().st_size > 10_000
     code, out, _ = called(monkeypatch, capsys, path, "--visuals", "--tool", "palm")
-    assert code == 0 and "warning" not in out and "chosen" not in out
+    assert code == 0 and "warning" not in out and "chosen" not in out and "<visual>" not in out
     assert "fingers" in out and "its geometry is swept" in out
 
 
@@ -87,6 +89,7 @@ def test_everything_is_printed_and_drawn(monkeypatch, capsys, tmp_path):
     [
         (["none.urdf"], "none.urdf: robot: no such file"),
         (["{}", "--tool", "x"], "frame 'x': not in the model; frames: "),
+        (["{}", "--tool", ""], "frame '': not in the model; frames: "),
         (["{}", "--locked", "turn"], "command line: --locked: 'turn' is not JOINT=VALUE"),
         (["{}", "--locked", "turn=up"], "command line: --locked: 'turn=up' is not JOINT=VALUE"),
         (["{}", "--locked", "x=1"], "locked joint 'x': not in the model; joints: turn, bend"),
@@ -116,6 +119,25 @@ def test_an_mjcf_file_is_read_as_it_compiles(monkeypatch, capsys, tmp_path):
     assert code == 2 and "is neither URDF nor MJCF" in err
 
 
+def test_a_last_body_without_a_name_is_no_tool(monkeypatch, capsys, tmp_path):
+    (tmp_path / "r.xml").write_text(MJCF.replace('body name="two"', "body"))
+    code, _, err = called(monkeypatch, capsys, tmp_path / "r.xml")
+    assert code == 2 and "r.xml: tool: the body at the end of the longest chain has no name; name the tool" in err
+    assert called(monkeypatch, capsys, tmp_path / "r.xml", "--tool", "tip")[0] == 0
+
+
+def test_two_arms_of_equal_length_have_no_single_tool(monkeypatch, capsys, tmp_path):
+    arms = (joint("left", "base", "one"), joint("right", "base", "two"))
+    path = written(tmp_path, link("base", BOX), link("one", BOX), link("two", BOX), *arms)
+    code, _, err = called(monkeypatch, capsys, path)
+    assert code == 2 and "robot.urdf: tool: there is no single longest chain of joints; name the tool" in err
+    side = '<body name="{0}"><joint name="{0}"/><geom size="0.1"/></body>'
+    text = f'<mujoco><worldbody><body name="base">{side.format("l")}{side.format("r")}</body></worldbody></mujoco>'
+    (tmp_path / "r.xml").write_text(text)
+    code, _, err = called(monkeypatch, capsys, tmp_path / "r.xml")
+    assert code == 2 and "r.xml: tool: there is no single longest chain" in err
+
+
 def test_volumes_are_those_of_the_capsules_and_of_the_boxes(tmp_path):
     robot = load_robot(RobotRequest(written(tmp_path, *PARTS)))
     volumes = {piece.name: piece for piece in volumes_of(robot)}
@@ -134,6 +156,63 @@ def test_no_posture_reaches_farther(tmp_path):
     reach, rng = reach_of(arm), np.random.default_rng(1)
     farthest = max(np.linalg.norm(arm.fk(rng.uniform(-2, 2, 3)).position - [0, 0, 0.5]) for _ in range(3000))
     assert farthest <= reach + 1e-9 and reach <= 0.7 + 1e-9
+
+
+@pytest.mark.parametrize("low, high, reach", [(0.0, 6.0, 6.4), (-9.0, -5.0, 9.4), (0.0, 1.0, 1.4)])
+def test_the_reach_along_a_rail_is_that_of_the_rail(low, high, reach, tmp_path):
+    limit = f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/>'
+    rail = joint("rail", "base", "car", "prismatic", axis="1 0 0", more=limit)
+    path = written(
+        tmp_path, link("base"), link("car"), link("tip"), rail, joint("turn", "car", "tip", "continuous", axis="0 1 0")
+    )
+    path.write_text(
+        path.read_text().replace("</robot>", f"{link('end')}{joint('e', 'tip', 'end', 'fixed', xyz='0.4 0 0')}</robot>")
+    )
+    assert reach_of(Arm.from_urdf(path, tcp_frame="end")) == pytest.approx(reach, abs=1e-6)
+
+
+def test_postures_lie_within_the_limits(tmp_path):
+    limit = '<limit lower="3.5" upper="6" effort="1" velocity="1"/>'
+    path = written(
+        tmp_path,
+        link("a"),
+        link("b"),
+        link("c"),
+        joint("far", "a", "b", more=limit),
+        joint("on", "b", "c", "continuous"),
+    )
+    low, high = postures_of(Arm.from_urdf(path, tcp_frame="c"))
+    assert (low[0], high[0]) == (3.5, 6.0) and low[1] == -high[1] < 0
+
+
+@pytest.mark.parametrize(
+    "text, kind",
+    [
+        ('<!-- made from <robot name="x"> --><mujoco/>', "mujoco"),
+        ("<?xml version='1.0'?><!-- <mujoco> --><robot/>", "robot"),
+        ("<!-- --- arm --- --><mujoco/>", "mujoco"),
+        (f"<!-- {'x' * 10**5} --><robot/>", "robot"),
+        ("<!DOCTYPE robot>\n<robot>", "robot"),
+    ],
+)
+def test_a_file_is_known_by_its_root_and_not_by_its_comments(text, kind, tmp_path):
+    (tmp_path / "x").write_text(text)
+    assert kind_of(tmp_path / "x") == kind
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        ("<robots/>", "its root is <robots>"),
+        ("<mujocoinclude/>", "its root is <mujocoinclude>"),
+        ("", "it has no element"),
+        ("<!-- <robot/> -->", "it has no element"),
+    ],
+)
+def test_another_file_is_told_what_it_is(text, says, tmp_path):
+    (tmp_path / "x").write_text(text)
+    with pytest.raises(BadModel, match=f"is neither URDF nor MJCF: {says}"):
+        kind_of(tmp_path / "x")
 
 
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=12), st.integers(1, 4))

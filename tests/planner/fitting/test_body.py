@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 from onedemo.planner.errors import BadModel, BadShape, NotFinite, OneDemoError, UnfitShape, UnknownName
 from onedemo.planner.fitting.body_readers import body_from_mujoco, body_from_urdf
 from onedemo.planner.fitting.finger_sweeps import sweep
-from onedemo.planner.fitting.robot_model import Joint
 from onedemo.planner.geometry.capsule_cover import covering_capsules, fitted_capsules, strips
 from onedemo.planner.geometry.hulls import capsule_volume, sticks_out, union_volume
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
+from onedemo.planner.models.model_joints import SLIDES, TURNS, ModelJoint
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body, last_from_tcp
 from onedemo.planner.robot.joint_frames import joint_frames
@@ -339,17 +339,19 @@ def test_the_split_can_be_chosen():
 
 
 @pytest.mark.parametrize(
-    "kind, low, high", [(0.0, -0.4, 1.9), (0.0, -np.inf, np.inf), (0.0, 1.0, 1.1), (1.0, -0.1, 0.3)]
+    "kind, low, high", [(TURNS, -0.4, 1.9), (TURNS, -np.inf, np.inf), (TURNS, 1.0, 1.1), (SLIDES, -0.1, 0.3)]
 )
-def test_a_sweep_contains_every_position_and_no_more(kind, low, high):
+@pytest.mark.parametrize("rest", [0.0, 0.2])
+def test_a_sweep_contains_every_position_and_no_more(kind, low, high, rest):
     rng = np.random.default_rng(10)
     axis, foot, points = np.array([0.48, 0.6, 0.64]), np.array([0.1, -0.2, 0.3]), rng.normal(size=(6, 3))
-    hull = ConvexHull(sweep(Joint(kind, axis, foot, low, high), points, "robot", "finger"))
+    finger = ModelJoint("finger", kind, axis, foot, low + rest, high + rest, rest)
+    hull = ConvexHull(sweep(finger, points, "robot", "finger"))
     first, last = max(low, -np.pi), min(high, np.pi)
     reached = []
     for value in np.linspace(first, last, 2001):
         turn = Rotation.from_rotvec(value * axis).as_matrix()
-        reached.append(foot + (points - foot) @ turn.T if kind == 0 else points + value * axis)
+        reached.append(foot + (points - foot) @ turn.T if kind == TURNS else points + value * axis)
     reached = np.vstack(reached)
     assert (reached @ hull.equations[:, :3].T + hull.equations[:, 3]).max() < 1e-9
     # a polygon of steps of 15 degrees is at most 0.9 % wider than its arc

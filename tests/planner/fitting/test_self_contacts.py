@@ -8,14 +8,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from helpers.arms import panda, panda_urdf
+from helpers.models.urdf_text import joint, link, written
 from helpers.strategies import for_all
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from onedemo.planner import Arm, Body, Pose, body_from_urdf
+from onedemo.planner import Arm, Body, Pose, SafetySettings, body_from_urdf
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.collision.hull_distance import CLOSE
-from onedemo.planner.collision.robot_arrays import robot_arrays
+from onedemo.planner.collision.robot_arrays import HEADER, PAIR, ROW, robot_arrays
 from onedemo.planner.fitting.self_contacts import survey_of
 from onedemo.planner.geometry.convex_pieces import best_cut, cut_off, rounded_hull, to_triangles
 from onedemo.planner.geometry.shapes import MAX_VERTICES, pack
@@ -87,6 +88,21 @@ def test_the_distance_is_never_more_than_the_truth_and_hardly_less():
             clear += 1
             refused += min(mine.values()) < MARGIN
     assert close > 20 and clear > 50 and refused <= 0.05 * clear
+
+
+def test_parts_that_always_pass_close_by_each_other_do_not_forbid_ordinary_postures():
+    arm, body = panda(), panda_with_hulls()
+    middle, meshes = 0.5 * (arm.lower + arm.upper), Meshes()
+    meshes.watch({(body.names[i], body.names[j]) for i, j in body.pairs})
+    # links 5 and 7 are closer there than the usual margin, without touching
+    assert 0.003 < meshes.distances(middle)["link5", "link7"] < MARGIN
+    assert {(body.names[i], body.names[j]) for i, j in body.margins} == {("link5", "link7")}
+    settings = SafetySettings(self_distance=MARGIN).packed(0.01)
+    work = robot_arrays((arm,), (body,), pack(()), pairs=body.pairs, settings=settings)
+    assert slack_at(work, middle, 0.0, 1.0) > 0.0
+    pairs = work[int(work[ROW.header, HEADER.first_pair]) :][: len(body.pairs)]
+    others = [row[PAIR.margin] for pair, row in zip(body.pairs, pairs, strict=True) if pair not in body.margins]
+    assert set(others) == {MARGIN}
 
 
 def test_few_parts_of_the_panda_can_hit_each_other():
@@ -198,3 +214,18 @@ def test_a_body_with_hulls_stays_within_its_capsules_at_any_base():
     g, h = (robot_arrays((a,), (b,), pack(()), pairs=b.pairs) for a, b in ((arm, body), (panda(), plain)))
     for q in np.random.default_rng(0).uniform(arm.lower, arm.upper, (50, 7)):
         assert slack_at(g, q, 0.0, 1.0) == pytest.approx(slack_at(h, q, 0.0, 1.0), abs=1e-5)
+
+
+@pytest.mark.parametrize("post", [3.0, 7.0])
+def test_a_contact_at_the_far_end_of_a_rail_is_found(post, tmp_path):
+    """A slide's range is a length: it has no turns."""
+    box = '<box size="0.1 0.1 0.4"/>'
+    place = f'<origin xyz="{post} 0.35 0.5"/>'
+    base = f'<link name="base"><collision>{place}<geometry>{box}</geometry></collision></link>'
+    limit = '<limit lower="0" upper="8" effort="1" velocity="1"/>'
+    rail = joint("rail", "base", "car", "prismatic", axis="1 0 0", xyz="0 0 0.5", more=limit)
+    arm_link = '<link name="arm"><collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 0.05 0.05"/></geometry>'
+    parts = (base, link("car", box), f"{arm_link}</collision></link>", rail, joint("turn", "car", "arm"))
+    path = written(tmp_path, *parts)
+    body = body_from_urdf(path, Arm.from_urdf(path, tcp_frame="arm"))
+    assert {(body.names[i], body.names[j]) for i, j in body.pairs} == {("link0", "link2")}

@@ -46,6 +46,7 @@ def test_limits_in_radians_pass_and_the_same_in_degrees_do_not(low, span):
         ([limited(0, 350, SLIDES)], 1, "limits of more than 10 m, in millimetres?: j"),
         ([limited(-1, 1)], 120, "speeds of more than 25 rad/s, in degrees?: j"),
         ([limited(-0.05, 0.05), limited(-0.03, 0.1)], 1, "limits of less than 7 degrees in all joints: is"),
+        ([limited(*np.radians([-6.28319, 6.28319]))] * 2, 1, "limits of less than 7 degrees in all joints: is"),
     ],
 )
 def test_doubtful_numbers_are_warned_of(joints, speed, says):

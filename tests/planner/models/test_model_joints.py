@@ -12,7 +12,7 @@ from helpers.models.urdf_text import joint, link, written
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onedemo.planner import Arm, Pose
+from onedemo.planner import Arm, Pose, body_from_mujoco
 from onedemo.planner.errors import BadModel
 from onedemo.planner.models.model_joints import TURNS, Coupling, ModelJoint, swept_range
 from onedemo.planner.models.mujoco_model import mujoco_couplings
@@ -141,7 +141,7 @@ def test_a_free_base_without_a_name_is_held_in_mjcf_and_a_body_may_be_the_tool()
     <body name="tip" pos="0.3 0.1 0" quat="1 0 1 0"/></body></body></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
     with pytest.raises(
-        BadModel, match=r"joint '\(joint of base, without a name\)': is neither a hinge nor a slide; base"
+        BadModel, match=r"joint '\(joint 0, of base, without a name\)': is neither a hinge nor a slide; base"
     ):
         Arm.from_mujoco(model, body="tip", velocity_limits=1.0)
     arm = Arm.from_mujoco(model, body="tip", velocity_limits=1.0, base_link="base")
@@ -169,7 +169,7 @@ def mimicking(folder, follows: str, leader: str = "first"):
     return written(folder, *parts, *joints)
 
 
-@pytest.mark.parametrize("leader", ["first", "second", "nobody"])
+@pytest.mark.parametrize("leader", ["first", "second"])
 def test_a_joint_of_the_arm_that_follows_another_is_refused_by_name(leader, tmp_path):
     message = f"joint 'third': follows '{leader}', so it is no joint of its own; lock '{leader}' to hold both"
     with pytest.raises(BadModel, match=message):
@@ -257,3 +257,73 @@ def test_polynomials_of_mjcf_are_about_the_references():
     (coupling,) = mujoco_couplings(model)
     assert (coupling.follower, coupling.leader) == ("y", "x") and coupling.at(0.3) == pytest.approx(-0.2)
     assert coupling.at(1.3) == pytest.approx(0.8)
+
+
+def test_a_pattern_that_matches_followers_alone_says_so(tmp_path):
+    path = mimicking(tmp_path, "third")
+    with pytest.raises(
+        BadModel, match=r"locked joint 'th\*': matches only joints of the arm, or joints that follow .*third"
+    ):
+        Arm.from_urdf(path, tcp_frame="e", locked={"th*": 0.0})
+    with pytest.raises(BadModel, match=r"locked joint 'j\[0\]': matches only joints of the arm"):
+        Arm.from_mujoco(random_mjcf(0), NAMES, site="tool", velocity_limits=1.0, locked={"j[0]": 0.0})
+
+
+def test_a_joint_that_the_model_holds_is_not_locked_elsewhere():
+    model = equality('<joint joint1="y" polycoef="0.1 0 0 0 0"/>')
+    with pytest.raises(BadModel, match=r"locked joint 'y': stands still at -0\.1, where the model couples it"):
+        Arm.from_mujoco(model, body="tip", velocity_limits=1.0, locked={"y": 0.4})
+
+
+def test_of_two_couplings_each_is_asked_about_its_own_leader():
+    model = equality(
+        '<joint joint1="y" joint2="x" polycoef="0 2 0 0 0"/><joint joint1="y" joint2="z" polycoef="0 5 0 0 0"/>'
+    )
+    arm = Arm.from_mujoco(model, body="tip", velocity_limits=1.0, locked={"x": 0.4})
+    assert arm.report.held == pytest.approx({"x": 0.4, "y": -0.2 + 2 * 0.1})
+
+
+AXIS = np.array([0.0, 0.0, 1.0])
+
+
+def turning(name: str, low: float, high: float) -> ModelJoint:
+    return ModelJoint(name, TURNS, AXIS, np.zeros(3), low, high, 0.0)
+
+
+def test_a_follower_of_a_follower_is_swept_as_far_as_the_first_leader_goes():
+    """Files often give followers no range of their own."""
+    joints = {joint.name: joint for joint in (turning("a", 0, 1), turning("b", 0, 0), turning("c", 0, 0))}
+    couplings = [Coupling("c", "b", (0.0, 2.0)), Coupling("b", "a", (0.5, 1.0))]
+    swept = swept_range(joints["c"], couplings, joints)
+    assert (swept.low, swept.high) == (0.0, 3.0)
+    joints["a"] = turning("a", -math.inf, math.inf)
+    swept = swept_range(joints["c"], couplings, joints)
+    assert (swept.low, swept.high) == (-math.inf, math.inf), "its leader turns without end"
+
+
+def test_joints_that_follow_each_other_have_their_own_ranges():
+    joints = {joint.name: joint for joint in (turning("a", 0, 1), turning("b", -1, 0))}
+    couplings = [Coupling("a", "b", (0.0, 1.0)), Coupling("b", "a", (0.0, 1.0))]
+    swept = swept_range(joints["a"], couplings, joints)
+    assert (swept.low, swept.high) == (-1.0, 1.0)
+
+
+NAMELESS = """<mujoco><compiler angle="radian"/><worldbody><body><geom size="0.1"/>
+<body pos="0 0 0.3"><joint axis="0 1 0" range="-2 2"/><joint axis="1 0 0" range="-1 1"/><geom size="0.1"/>
+<body pos="0 0.1 0.3"><joint axis="0 0 1" range="-2 2"/><geom size="0.1"/><site name="tip" pos="0.2 0 0"/></body>
+</body></body></worldbody></mujoco>"""
+
+
+def test_joints_and_bodies_without_names_are_told_apart():
+    model = mujoco.MjModel.from_xml_string(NAMELESS)
+    arm = Arm.from_mujoco(model, site="tip", velocity_limits=1.0)
+    assert len(set(arm.joint_names)) == 3 and arm.upper.tolist() == [2.0, 1.0, 2.0]
+    data = mujoco.MjData(model)
+    for q in np.random.default_rng(0).uniform(-1, 1, (5, 3)):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        np.testing.assert_allclose(arm.fk(q).position, data.site("tip").xpos, atol=1e-12)
+    body = body_from_mujoco(model, arm, exact=False)
+    assert body.names == ("link0", "link2", "link3")
+    held = Arm.from_mujoco(model, site="tip", velocity_limits=1.0, locked={arm.joint_names[1]: 0.3})
+    assert held.joint_names == (arm.joint_names[0], arm.joint_names[2])

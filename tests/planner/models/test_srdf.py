@@ -31,6 +31,7 @@ def test_pairs_are_read_with_their_reasons(tmp_path):
         (None, "SRDF: no such file"),
         ("<robot", "SRDF: cannot be read"),
         ("<urdf/>", "SRDF: is none: its root is <urdf>, not <robot>"),
+        ('<robot><link name="a"/></robot>', "SRDF: is none: it has <link> elements, like a URDF"),
         ('<robot><disable_collisions link1="a"/></robot>', r"disable_collisions\[0\]: needs link1 and link2, two"),
         ('<robot><disable_collisions link1="a" link2="a"/></robot>', r"disable_collisions\[0\]: needs link1 and"),
     ],

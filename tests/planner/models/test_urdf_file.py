@@ -24,6 +24,21 @@ BAD = {
     "two links": ((A, A, B, TURN), "link 'a': there are 2 of this name"),
     "two joints": ((A, B, link("c"), TURN, joint("j", "b", "c")), "joint 'j': there are 2 of this name"),
     "no name": ((A, B, TURN, "<link/>"), "link: one has no name"),
+    **{
+        f"{name} {text}": (
+            (A, B, TURN.replace("<origin", f'<origin {name}="{text}"')),
+            f"joint 'j': the {name} '{text}' of the <origin> of",
+        )
+        for name, text in (("xyz", "0 0"), ("xyz", "0 0 nan"), ("rpy", "a b c"), ("rpy", "1,5 0 0"), ("xyz", "0 0 inf"))
+    },
+    "axis of two": (
+        (A, B, joint("j", "a", "b", axis="0 1")),
+        "joint 'j': the xyz '0 1' of the <axis> of a <joint> is not thr",
+    ),
+    "odd speed": (
+        (A, B, TURN.replace('velocity="1"', 'velocity="fast"')),
+        "joint 'j': the velocity 'fast' of its <limit>",
+    ),
     "no limit": ((A, B, TURN.replace("<limit", "<no")), "joint 'j': is revolute and has no <limit>; .* continuous"),
     "no speed": ((A, B, TURN.replace("velocity", "v")), "joint 'j': its <limit> has no velocity"),
     "no effort": ((A, B, TURN.replace("effort", "e").replace("velocity", "v")), "has no effort and no velocity"),
@@ -42,7 +57,22 @@ BAD = {
         ),
         "mimics itself",
     ),
-    "odd multiplier": ((A, B, joint("j", "a", "b", more='<mimic joint="k" multiplier="x"/>')), "<mimic> is not a num"),
+    "odd multiplier": (
+        (A, B, link("c"), joint("j", "a", "b", more='<mimic joint="k" multiplier="x"/>'), joint("k", "b", "c")),
+        "<mimic> is not a num",
+    ),
+    "follows nobody": ((A, B, joint("j", "a", "b", more='<mimic joint="x"/>')), "joint 'j': mimics 'x', which is no j"),
+    "a circle beside": (
+        (A, B, TURN, link("c"), link("d"), joint("k", "c", "d"), joint("l", "d", "c")),
+        "links: these hang in a circle, not on 'a': c, d",
+    ),
+    **{
+        f"limits {low} {high}": (
+            (A, B, TURN.replace('lower="-2" upper="2"', f'lower="{low}" upper="{high}"')),
+            f"joint 'j': its limits are '{low}' and '{high}', not two numbers in order",
+        )
+        for low, high in (("2", "-2"), ("nan", "1"), ("-inf", "inf"), ("inf", "inf"), ("-1,5", "1,5"), ("", "1"))
+    },
 }
 
 
@@ -54,6 +84,15 @@ def test_what_cannot_be_used_is_named_in_one_line(name, tmp_path):
         with pytest.raises(BadModel, match=message) as caught:
             read(path)
         assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("encoding", ["gb2312", "shift_jis", "klingon"])
+def test_an_encoding_that_cannot_be_read_is_one_line(encoding, tmp_path):
+    path = written(tmp_path, A, B, TURN)
+    path.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{path.read_text()}')
+    with pytest.raises(BadModel, match=r"robot\.urdf: URDF: cannot be read: ") as caught:
+        read_urdf_file(path)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("text", ["<mujoco/>", "<sdf version='1.7'/>", "no XML", "", "<robot name='r'><link"])
@@ -92,6 +131,11 @@ FAULTY = {
     "nan": ("<sphere radius='nan'/>", "the radius 'nan' of its <sphere> is not positive"),
     "no file": ("<mesh/>", "a mesh has no filename"),
     "scale": ("<mesh filename='x.stl' scale='1 0 1'/>", "the scale '1 0 1' of a mesh is not three numbers other than"),
+    "scheme": (
+        "<mesh filename='http://x/a.stl'/>",
+        "the mesh 'http://x/a.stl' is not at a path, at package:// or at f",
+    ),
+    "too large": ("<box size='1 1 200'/>", r"box: size\[2\]: 200.0 is not a length"),
     "missing mesh": ("<mesh filename='package://p/none.stl'/>", r"none\.stl.*package_dirs"),
 }
 
@@ -104,6 +148,67 @@ def test_collision_geometry_is_never_dropped(name, tmp_path):
     with pytest.raises(BadModel, match=message) as caught:
         body_from_urdf(path, Arm.from_urdf(path, tcp_frame="b"))
     assert "\n" not in str(caught.value) and ("link 'b'" in str(caught.value) or name == "missing mesh")
+
+
+SPHERE = '<geometry><sphere radius="0.1"/></geometry>'
+BROKEN = {
+    "place of two numbers": (
+        f'<collision><origin xyz="0 0"/>{SPHERE}</collision>',
+        "xyz '0 0' of the <origin> of a <coll",
+    ),
+    "place nowhere": (
+        f'<collision><origin xyz="nan 0 0"/>{SPHERE}</collision>',
+        "xyz 'nan 0 0' of the <origin> of a <coll",
+    ),
+    "angles": (f'<collision><origin rpy="a b c"/>{SPHERE}</collision>', "rpy 'a b c' of the <origin> of a <collision>"),
+    "one of two": (
+        f'<collision>{SPHERE}</collision><collision><origin xyz="0 0 x"/>{SPHERE}</collision>',
+        "xyz '0 0 x' of the <ori",
+    ),
+    "mass": (
+        f'<inertial><mass value="x"/></inertial><collision>{SPHERE}</collision>',
+        "only 0 of its 1 elements of geom",
+    ),
+    "visual": (
+        f"<visual><origin xyz='0'/>{SPHERE}</visual><collision>{SPHERE}</collision>",
+        "only 0 of its 1 elements",
+    ),
+    "far": (
+        f'<collision><origin xyz="200 0 0"/>{SPHERE}</collision>',
+        "geometry has a point that is not finite or farther",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_no_element_of_a_broken_link_is_lost_without_a_word(name, tmp_path):
+    """Pinocchio's parser stops reading such a link, and goes on with the next one."""
+    inside, message = BROKEN[name]
+    path = written(tmp_path, link("a", '<sphere radius="0.1"/>'), f'<link name="b">{inside}</link>', TURN)
+    arm = Arm.from_urdf(path, tcp_frame="b")
+    with pytest.raises(BadModel, match=message) as caught:
+        body_from_urdf(path, arm)
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
+
+
+def test_a_vertex_nowhere_is_refused_with_its_file(tmp_path):
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 nan 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
+    path = written(tmp_path, A, link("b", '<mesh filename="m.obj"/>'), TURN)
+    with pytest.raises(BadModel, match=r"robot\.urdf: "):
+        body_from_urdf(path, Arm.from_urdf(path, tcp_frame="b"))
+
+
+def test_a_name_that_parsers_read_differently_is_refused(tmp_path):
+    path = written(tmp_path, A, *(part.replace('"b"', '"b\nc"') for part in (B, TURN)))
+    with pytest.raises(BadModel, match=r"link 'b\\nc': its name holds a line break or a tab"):
+        Arm.from_urdf(path, tcp_frame="a")
+
+
+def test_a_robot_without_a_name_is_one_line(tmp_path):
+    path = written(tmp_path, A, B, TURN)
+    path.write_text(path.read_text().replace('<robot name="r">', "<robot>"))
+    with pytest.raises(BadModel, match="robot: one has no name"):
+        read_urdf_file(path)
 
 
 def test_what_nobody_uses_is_reported(tmp_path):

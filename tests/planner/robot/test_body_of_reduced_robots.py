@@ -105,6 +105,29 @@ def test_what_is_left_out_is_reported():
     }  # fmt: skip
 
 
+def test_what_stands_around_the_robot_is_reported():
+    from onedemo.planner.fitting.mujoco_parts import parts_from_mujoco
+    from onedemo.planner.fitting.robot_parts import PartsRequest
+
+    def around(text: str) -> list[str]:
+        model = mujoco.MjModel.from_xml_string(text)
+        arm = Arm.from_mujoco(model, body="wrist", velocity_limits=1.0, base_link="torso")
+        unused = parts_from_mujoco(model, arm, None, PartsRequest({}, False)).report.unused
+        return [line.rpartition(": ")[2] for line in unused if line.startswith("bodies around the robot")]
+
+    table = '<geom type="plane" size="1 1 1"/><body name="table"><geom size="0.1"/></body>'
+    assert around(MOBILE) == ["floor"]
+    assert around(MOBILE.replace("<worldbody>", f"<worldbody>{table}")) == ["the world, table, floor"]
+
+
+def test_a_joint_that_the_arm_holds_is_not_held_elsewhere():
+    model, arm = mobile(lift=0.2)
+    with pytest.raises(BadModel, match=r"locked joint 'lift': is held at 0\.2 by the arm"):
+        body_from_mujoco(model, arm, locked={"lift": 0.3}, exact=False)
+    same = body_from_mujoco(model, arm, locked={"lift": 0.2}, exact=False)
+    assert np.array_equal(same.rows, body_from_mujoco(model, arm, exact=False).rows)
+
+
 URDF = (
     link("root"),
     link("base", BOX),
@@ -226,3 +249,22 @@ def test_scaled_and_mirrored_meshes_are_covered_where_they_are(scale, tmp_path):
         written(tmp_path, link("a"), link("b", mesh.replace("-", "")), joint("j", "a", "b")), arm, split=1
     )
     assert body.rows[0, 7] == pytest.approx(plain.rows[0, 7], rel=0.02), "a mirrored mesh is as large as the mesh"
+
+
+def test_a_flat_jaw_is_refused_in_one_line(tmp_path):
+    """Swept, it has no mesh any more, and no hull either."""
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0 0.1\nv 0.1 0 0.1\nf 1 2 3\nf 2 4 3\n")
+    jaw = link("jaw", '<mesh filename="flat.obj"/>')
+    slide = joint("slide", "b", "jaw", "prismatic", axis="1 0 0")
+    for beside in ((), ('<mesh filename="flat.obj"/>',)):
+        path = written(tmp_path, link("a", BOX), link("b", *beside), jaw, joint("j", "a", "b"), slide)
+        with pytest.raises(BadModel, match=r"robot\.urdf: \w+: the points of its geometry cannot be covered") as caught:
+            body_from_urdf(path, Arm.from_urdf(path, tcp_frame="b"))
+        assert "\n" not in str(caught.value)
+
+
+def test_too_many_balls_are_refused_with_their_file(tmp_path):
+    balls = "".join(f'<collision><geometry><sphere radius="0.0{k + 10}"/></geometry></collision>' for k in range(65))
+    path = written(tmp_path, link("a"), f'<link name="b">{balls}</link>', joint("j", "a", "b"))
+    with pytest.raises(BadModel, match=r"robot\.urdf: collision geometry: it takes 65 capsules; allowed are 64"):
+        body_from_urdf(path, Arm.from_urdf(path, tcp_frame="b"))
