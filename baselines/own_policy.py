@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from copy import deepcopy
 from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
@@ -40,7 +41,7 @@ def own_policy(name: str, task: TaskDescription, demonstration: Demonstration, s
     if not callable(make):
         raise BadConfig("method", name, f"is a {type(make).__name__}, not a class or function")
     try:
-        policy = make(task, demonstration, settings)
+        policy = make(task, demonstration, deepcopy(dict(settings)))  # the config's own serve further episodes
     except OneDemoError:
         raise
     except Exception as error:

@@ -56,7 +56,7 @@ class Episode:
     """Memory of an episode: the executor, the running program and its end.
 
     Args:
-        executor: of one or two arms.
+        executor: executor of one or two arms.
         program: program of the task.
     """
 

@@ -48,7 +48,7 @@ class FormerModule(ModuleType):
     """A module under its former path; it gives the names of the present one."""
 
     def __getattr__(self, name: str) -> Any:
-        """Give a name of the present module."""
+        """Return an attribute of the present module."""
         if name == "__all__":
             return dir(self)
         former = self.__name__.partition(".")[2]
@@ -63,7 +63,7 @@ class FormerModule(ModuleType):
         )
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """Call the function of the module's own name: it hides the public name of that package, as `certify`."""
+        """Call the function of the module's own name, like `certify`, whose public name the module hides."""
         return getattr(self, self.__name__.rpartition(".")[2])(*arguments, **options)
 
 
@@ -93,6 +93,6 @@ class FormerPaths(MetaPathFinder, Loader):
 
 
 def keep() -> None:
-    """Make the former paths importable; doing it twice does no harm."""
+    """Make the former paths importable; repeated calls do no harm."""
     if not any(type(finder).__name__ == FormerPaths.__name__ for finder in sys.meta_path):
         sys.meta_path.append(FormerPaths())

@@ -29,10 +29,12 @@ def numbers(what: str, value: Any) -> np.ndarray:
         value: an array, or nested sequences.
 
     Raises:
-        WrongType: anything else than real numbers in a rectangular array.
+        WrongType: anything else than real numbers in a rectangular array, or some are masked.
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
+    if np.ma.is_masked(value):  # numpy would hand out what lies under the mask
+        raise WrongType(what, value, "an array of numbers, none of them masked")
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):

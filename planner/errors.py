@@ -112,7 +112,7 @@ class UnknownName(OneDemoError, ValueError):
 
 
 class BadOption(OneDemoError, ValueError):
-    """An environment option has a value that cannot be used."""
+    """An option, a setting or an argument has a value that cannot be used."""
 
     def __init__(self, option: str, reason: str):
         self.option, self.reason = option, reason
@@ -120,7 +120,7 @@ class BadOption(OneDemoError, ValueError):
 
 
 class PlanFailed(OneDemoError):
-    """No plan was found; `reason` says why in the words of the failure taxonomy."""
+    """No plan was found, or it cannot be refined; `reason` says why in the words of the failure taxonomy."""
 
     def __init__(self, reason: str, detail: str):
         self.reason, self.detail = reason, detail

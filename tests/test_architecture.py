@@ -60,6 +60,13 @@ JUDGE_SHARES = {
     "planner.robot",
     "planner.log",
 }
+QUERIES = {
+    "planner.geometry.gjk",
+    "planner.geometry.convex_distance",
+    "planner.geometry.convex_pieces",
+    "planner.robot.resting_pairs",
+}
+"""In layers that the judge shares, and not for it."""
 MOST_FILES = 14
 """In one folder."""
 
@@ -122,6 +129,8 @@ def test_the_judge_shares_no_query_with_the_planner():
             seen.add(module)
             todo += graph()[module]
     assert {layer_of(module) for module in seen} - {"planner.judge"} <= JUDGE_SHARES
+    assert not seen & QUERIES
+    assert set(graph()) >= QUERIES
 
 
 def test_no_folder_is_crowded():

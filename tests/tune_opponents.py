@@ -1,8 +1,8 @@
 """Try the settings of an opponent: `python tests/tune_opponents.py configs/tuning/potential.yaml`.
 
 A grid in the file is tried on the stacking task's scenarios, without physics: for every block the fetch and the place
-as they would be planned, rolled out kinematically. Printed are the shares of legs that arrive, and that arrive without
-the arm or what it holds touching an obstacle. Seeds are the file's, never those that are reported in the README.
+as they would be planned, rolled out kinematically. Printed are the shares of motions that arrive, and that arrive
+without the arm or what it holds touching an obstacle. Seeds are the file's, never those reported in the README.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def legs_of(policy: Any, observation: Any) -> list[Plan]:
 
 
 def tried(env: Any, method: str, settings: dict[str, Any], seeds: range) -> tuple[float, float, float, float]:
-    """Shares of legs that arrive, that arrive clear; screw length over the demonstration's; seconds per leg."""
+    """Shares of motions that arrive, that arrive clear; screw length over the demonstration's; seconds per motion."""
     demonstration = read_demonstration(shipped_demonstration("stack"))
     policy = make_policy(method, env.unwrapped.task, demonstration, settings)
     wanted, arrived, clear, lengths, begun = 0, 0, 0, [], time.perf_counter()
@@ -83,7 +83,7 @@ def main(file: str) -> None:
     seeds = range(config["seed"], config["seed"] + config["scenarios"])
     assert not set(seeds) & set(RESERVED), "these seeds are reported"
     env, keys = gym.make("onedemo/Stack-v0", level=config["level"]), list(config["grid"])
-    print(f"{'  '.join(keys)}  arrive  clear  length  s/leg")
+    print(f"{'  '.join(keys)}  arrive  clear  length  s/motion")
     for values in product(*config["grid"].values()):
         row = tried(env, config["method"], nested(keys, values), seeds)
         print("  ".join(map(str, values)), "  {:.2f}  {:.2f}  {:.2f}  {:.3f}".format(*row), flush=True)

@@ -128,7 +128,7 @@ def actor_of_zip(path: Path, task: TaskDescription, *, method: str) -> Actor:
         said = one_line(f"{type(error).__name__}: {error}")
         raise BadActor(path, "file", f"Stable-Baselines3 cannot read it as {kind} ({said})") from None
     if not hasattr(model.observation_space, "spaces"):
-        reason = "is a flat box, and the zip does not say of what: export it (baselines/learning/export_actor.py)"
+        reason = "is a flat box, and the zip does not say of what: export it (onedemo.baselines.actor_of)"
         raise BadActor(path, "observation_space", reason)
     try:
         return actor_of(model, task, method=method)

@@ -37,8 +37,8 @@ class DmpSettings:
 
     Attributes:
         weights: number of weights of the forcing term, per dimension.
-        regularization: of their regression; without regularization, the remaining force at the end holds the primitive
-            some millimeters off its goal.
+        regularization: regularization of their regression; without it, the remaining force at the end keeps the
+            primitive some millimeters off its goal.
         gamma: gain of the coupling term; 0 ignores obstacles.
         beta: decay of the coupling term with the angle between motion and obstacle [1/rad].
         influence: distance [m] at which an obstacle begins to act. The original formula lacks this limit: it would turn

@@ -35,7 +35,7 @@ class GeneratedPlanner(MotionPlanner):
         arm: the arm.
         body: its capsules, held object included.
         settings: see `PlanSettings`; `repet` and `search` are ignored.
-        generator: of the paths.
+        generator: generator of the paths.
     """
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, generator: PathGenerator):

@@ -32,7 +32,8 @@ from ...planner.imitation.tsia import GUIDE_START
 from ...planner.planning.plan import MotionPlanner
 
 DIRECT, ESCAPE, PATH, JOINTS = "direct", "escape", "path", "joints"
-"""Values of `Plan.how`; the last two are of generated paths and of searches in joint space."""
+"""Values of `Plan.how`; the last two are of generated paths and of RRT-Connect. A plan of `Planner` found by its own
+search in joint space has "joint search"."""
 NO_PATH = "no way found"
 """Reason of a plan whose generator or search found no path."""
 MADE = (PATH, JOINTS)
@@ -75,7 +76,7 @@ class Relative(NamedTuple):
     """Motion of one hand in the frame of another.
 
     Attributes:
-        path: from the present relative pose to the end of the demonstrated one.
+        path: path from the present relative pose to the end of the demonstrated one.
         tail: number of last poses that belong to the task; the poses before are the approach.
     """
 

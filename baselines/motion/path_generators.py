@@ -22,7 +22,7 @@ class GeneratedPath(NamedTuple):
     """A generated path.
 
     Attributes:
-        path: from the start; ends before the goal where generation failed.
+        path: path from the start; ends before the goal where generation failed.
         states: data to continue generation from each pose; () if not needed.
     """
 
@@ -48,7 +48,7 @@ class PathGenerator(ABC):
         Args:
             shown: the demonstrated segment, in its original place.
             start: present pose of the tcp.
-            goal: of the tcp.
+            goal: goal pose of the tcp.
             guide: index of the guiding pose in `shown`.
             near: obstacles around the tool.
         """
@@ -58,7 +58,7 @@ class PathGenerator(ABC):
 
         Args:
             made: the path.
-            index: of the pose.
+            index: index of the pose.
             near: obstacles around the tool now.
         """
         return made

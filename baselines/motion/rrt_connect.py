@@ -69,7 +69,7 @@ def joint_path(
         start: (n,) joints [rad].
         goals: (n,) joints each [rad]; those that are not clear, or beyond a limit, are left out.
         settings: see `RrtSettings`.
-        seed: of OMPL's random numbers.
+        seed: seed of OMPL's random numbers.
 
     Returns:
         Points (k, n) of the path [rad]; None if no path was found.
@@ -142,7 +142,7 @@ def informed(space: Any, g: np.ndarray) -> Any:
     """Return OMPL's information on a space, with the planner's own clearance check; its setup is left to the caller.
 
     Args:
-        space: as returned by `joint_space`.
+        space: space as returned by `joint_space`.
         g: the robot among obstacles, see `planner.collision.robot_arrays`.
     """
     ob: Any = needed("ompl.base", "ompl")
@@ -155,7 +155,7 @@ def state_of(space: Any, q: np.ndarray) -> Any:
     """Return joints as a state of OMPL's.
 
     Args:
-        space: as returned by `joint_space`.
+        space: space as returned by `joint_space`.
         q: (n,) joints [rad].
     """
     state = space.allocState()

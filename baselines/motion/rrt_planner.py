@@ -96,10 +96,10 @@ class RrtPlanner(MotionPlanner):
 
         Args:
             q: (dof,) present joints [rad].
-            goal: of the tcp.
+            goal: goal pose of the tcp.
             obstacles: around the arm.
             allowed: allowed contacts, (body name, obstacle name).
-            seed: of OMPL's random numbers.
+            seed: seed of OMPL's random numbers.
 
         Returns:
             Joints (t, dof) [rad] at every tick, or the reason of failure.

@@ -50,8 +50,8 @@ class ToolFramePlanner(MotionPlanner):
     """Planner of motions in another frame of the hand; see `planner.planning.plan.MotionPlanner`.
 
     Args:
-        planner: of the arm with that frame as its tcp.
-        arm: with the true tcp.
+        planner: planner of the arm with that frame as its tcp.
+        arm: arm with the true tcp.
         tcp_from_tool: the frame.
     """
 
@@ -75,7 +75,7 @@ class ToolFrameFollower:
     """Follower of motions in another frame of the hand; see `motion_method.Follower`.
 
     Args:
-        follower: of the arm with that frame as its tcp.
+        follower: follower of the arm with that frame as its tcp.
         arm: that arm.
         tcp_from_tool: the frame.
     """

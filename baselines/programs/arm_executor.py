@@ -50,7 +50,7 @@ class ArmExecutor:
         settings: see `ReactiveSettings`.
         world_model: obstacles around the arm.
         observation: the first one.
-        index: of the arm in the observation.
+        index: index of the arm in the observation.
         motion_method: method of executing motions.
 
     Attributes:
@@ -103,8 +103,8 @@ class ArmExecutor:
         """Treat an object as part of the arm from now on, no longer as an obstacle.
 
         Args:
-            index: of the object.
-            shape: of the object.
+            index: index of the object.
+            shape: shape of the object.
             tcp_from_object: its pose in the hand.
         """
         self._held = _Held(index, shape, tcp_from_object, tcp_from_object)
@@ -131,7 +131,7 @@ class ArmExecutor:
         """Return the body with an object in the hand, named "held".
 
         Args:
-            shape: of the object.
+            shape: shape of the object.
             tcp_from_object: its pose in the hand.
         """
         return self.empty.holding("held", shape, tcp_from_object, self.arm)
@@ -181,11 +181,11 @@ class ArmExecutor:
         """Follow a path to its end, around obstacles.
 
         Args:
-            path: of the tcp.
+            path: path of the tcp.
             exact: False: finish as soon as the tool is within reach of the end.
             next_motion: the next motion: where there is a choice, the path ends in a posture that suits it.
             detours: False: along the path or not at all.
-            plan: the plan the path comes from; if its kind is PATH, the follower gets the plan itself.
+            plan: the plan the path comes from; if its `how` is PATH, the follower gets the plan itself.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no progress for the settings' patience; "dropped", the held object
@@ -216,8 +216,8 @@ class ArmExecutor:
         A detour there would push objects over.
 
         Args:
-            path: of the tcp.
-            distance: from the beginning [m] up to which there are no detours.
+            path: path of the tcp.
+            distance: distance [m] from the beginning up to which there are no detours.
 
         Raises:
             PlanFailed: as `follow`.

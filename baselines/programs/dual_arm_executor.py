@@ -86,7 +86,7 @@ class DualArmExecutor:
 
         Args:
             arm: index of the arm.
-            index: of the object.
+            index: index of the object.
         """
         tcp = Pose.from_vector(self.observation["tcp_pose"][arm])
         return tcp.inverse() @ Pose.from_vector(self.observation["object_pose"][index])
@@ -108,7 +108,7 @@ class DualArmExecutor:
         """Move both hands along paths, or to their ends by the motion method's own joint-space path.
 
         Args:
-            paths: of the two tcps, equally many poses.
+            paths: paths of the two tcps, equally many poses.
             radius: see `follow` [m].
 
         Raises:
@@ -139,7 +139,7 @@ class DualArmExecutor:
         """Follow two paths pose by pose.
 
         Args:
-            paths: of the two tcps, equally many poses.
+            paths: paths of the two tcps, equally many poses.
             radius: path length [m] to its pose within which each hand must be before the next pair of poses.
 
         Raises:
@@ -173,7 +173,7 @@ class DualArmExecutor:
         """Predict the result of following two paths from now on, by kinematics alone; nothing is moved.
 
         Args:
-            paths: of the two tcps, equally many poses.
+            paths: paths of the two tcps, equally many poses.
             radius: see `follow` [m].
         """
         start, previous = self.q.copy(), self._layer.work[ROW.previous].copy()

@@ -38,10 +38,10 @@ class MotionChoice(NamedTuple):
     """A motion that may end at any of several goals.
 
     Attributes:
-        name: of its object, for messages.
+        name: name of the motion or of its object, for messages.
         demonstrated: the segment to imitate.
         goals: possible poses of the tcp at the end.
-        body: of the arm, held object included.
+        body: capsules of the arm, held object included.
         obstacles: around the arm; moving ones are ignored in planning.
         allowed: allowed contacts, see `Planner.plan`.
         leaving: the segment whose beginning is imitated at the departure; None: no departure, blend at once.
@@ -64,8 +64,8 @@ class ChosenMotion(NamedTuple):
     """The chosen goal and the motion to it.
 
     Attributes:
-        index: of the goal.
-        plan: to the goal.
+        index: index of the goal.
+        plan: plan to the goal.
         departure: path of the departure; None: no departure.
         then: the choice of the next motion from there; None if not requested or infeasible.
     """

@@ -50,7 +50,7 @@ class CarryCandidate(NamedTuple):
     """Consecutive motions as planned.
 
     Attributes:
-        paths: to follow.
+        paths: paths to follow.
         plans: the plan of each path.
         q: (dof,) joints at the end [rad].
         margin: smallest joint margin on the way [rad].
@@ -84,7 +84,7 @@ class PourProgram:
         task: the task.
         shown: the demonstration.
         settings: see `ProgramSettings`.
-        executor: of the arm.
+        executor: executor of the arm.
     """
 
     SEGMENTS = ("carry",)

@@ -54,7 +54,7 @@ def lip(size: Size, direction: np.ndarray) -> Pose:
     """Return `glass_from_lip`.
 
     Args:
-        size: of the glass.
+        size: size of the glass.
         direction: (2,) unit, of the lip in the frame of the glass.
     """
     return Pose.from_position_quaternion([*(size.radius * direction), 0.5 * size.height])
@@ -64,7 +64,7 @@ class PourGoals:
     """Goals of the hand for glasses anywhere, derived from the demonstrated goals.
 
     Args:
-        task: with the sizes of the glasses.
+        task: task with the sizes of the glasses.
         shown: the demonstration: "carry" ends relative to the target, "approach", if present, relative to the source.
         held: `tcp_from_source` that replaces the demonstrated grasp if there is no "approach".
 

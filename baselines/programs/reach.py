@@ -25,7 +25,7 @@ class ReachProgram:
         task: the task.
         shown: the demonstration.
         settings: see `ProgramSettings`.
-        executor: of the arm.
+        executor: executor of the arm.
     """
 
     SEGMENTS = ("approach",)

@@ -44,7 +44,7 @@ class ShelveProgram:
         task: the task.
         shown: the demonstration.
         settings: see `ProgramSettings`.
-        executor: of the arm.
+        executor: executor of the arm.
     """
 
     SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")

@@ -30,7 +30,7 @@ def grasps(demonstration: Demonstration, target: TaskObject) -> list[Pose]:
     The demonstrated grasp is turned so that the fingers close along the object's narrower horizontal axis.
 
     Args:
-        demonstration: with the segment "approach".
+        demonstration: demonstration with the segment "approach".
         target: the object.
     """
     object_pose = demonstration.segment("approach").reference_pose
@@ -46,7 +46,7 @@ def releases(target: TaskObject, goal: Pose, tcp_from_object: Pose, height: floa
 
     Args:
         target: the object.
-        goal: of the object.
+        goal: goal pose of the object.
         tcp_from_object: pose of the object in the hand.
         height: above the goal [m].
     """
@@ -61,7 +61,7 @@ class StackProgram:
         task: the task.
         shown: the demonstration.
         settings: see `ProgramSettings`.
-        executor: of the arm.
+        executor: executor of the arm.
     """
 
     SEGMENTS = ("approach", "transfer")

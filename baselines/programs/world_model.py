@@ -26,7 +26,7 @@ class WorldModel:
     """The obstacles of one arm, updated only when an object has moved.
 
     Args:
-        task: with the fixtures and the objects' shapes.
+        task: task with the fixtures and the objects' shapes.
         table_margin: margin [m] of the table.
         margin: margin [m] of objects and furniture.
 

@@ -111,9 +111,9 @@ class ConvexSolid:
         """
         if len(self.planes):
             ahead, outside = self.planes[:, :3] @ view.axes[2], points @ self.planes[:, :3].T + self.planes[:, 3]
-            margins = -outside / np.where(np.abs(ahead) < 1e-9, np.nan, ahead)
-            enters = np.nanmax(np.where(ahead < -1e-9, margins, -np.inf), axis=1)
-            leaves = np.nanmin(np.where(ahead > 1e-9, margins, np.inf), axis=1)
+            distances = -outside / np.where(np.abs(ahead) < 1e-9, np.nan, ahead)
+            enters = np.nanmax(np.where(ahead < -1e-9, distances, -np.inf), axis=1)
+            leaves = np.nanmin(np.where(ahead > 1e-9, distances, np.inf), axis=1)
             beside = (outside[:, np.abs(ahead) < 1e-9] > 0).any(axis=1)
             return (np.maximum(enters, 1e-6) < leaves) & ~beside
         ends, flat = view.flat(self.core), view.flat(points)

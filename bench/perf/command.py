@@ -19,6 +19,7 @@ from ...planner.errors import UnknownName
 from ..console import check_writable, console, labeled, writing
 from .learning import LEARNING_LINES
 from .measuring import Row, row, seconds_per_call
+from .near_contact import NEAR_LINES
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
 from .planner import LINES
 from .report import REPORT_LINES
@@ -145,7 +146,7 @@ def _measured(code: str) -> float:
 Lines = dict[str, Callable[[], Row]]
 GROUPS: dict[str, Lines] = {
     "controller": {TICK: _tick, KINEMATICS: _kinematics},
-    "planner": LINES,
+    "planner": {**LINES, **NEAR_LINES},
     "step": {**TASK_LINES, PEER_STEP: _peer_step},
     "run": RUN_LINES,
     "process": {MEMORY: _memory, IMPORT: _import, START: _start, HELP: _help},

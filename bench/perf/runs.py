@@ -16,7 +16,7 @@ from .measuring import Row, row
 EPISODE = "Stack episode, policy included / real time"
 PROCESSES = "two local workers, per episode / one"
 ACTORS = "two Ray actors, per episode / one"
-GEOMETRIC = "1000 geometric scenarios, all path makers, 2 cores / 5 minutes"
+GEOMETRIC = "1000 geometric scenarios, all path generators, 2 cores / 5 minutes"
 CONFIG = RunConfig(name="perf", task="stack", demonstration="stack", video=False)
 SHORT = CONFIG.model_copy(update={"max_seconds": 10.0})
 BATCH, BATCHES = 8, 3

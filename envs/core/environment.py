@@ -10,8 +10,7 @@ from typing import Any, Generic, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from ...planner import Obstacle as FreeBody
-from ...planner import Pose
+from ...planner import Obstacle, Pose
 from ...planner.errors import BadOption, UnknownName
 from ..errors import BadAction, NoRoom
 from ..scene.robot_description import robot_parts
@@ -63,6 +62,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
 
     Args:
         name: task name.
+        robot: the robot.
         goals: number of goal poses.
         motions: largest motion index.
         more: task-specific entries of the observation.
@@ -210,7 +210,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         task, motions = self.task, self._placement_motions(start)
         things = []
         for each, pose in zip(task.objects, start.objects, strict=True):
-            things.append(FreeBody(each.shape, Pose.from_vector(pose), name=each.name))
+            things.append(Obstacle(each.shape, Pose.from_vector(pose), name=each.name))
         for each, pose in zip(task.furniture, start.furniture, strict=True):
             things += each.at(Pose.from_vector(pose))
         solids = [*task.fixtures, *things]

@@ -67,7 +67,7 @@ class SingleMotionEnv(TaskEnv[ProgressT]):
 
     def _check_way(self, obstacles: Any) -> None:
         if not self._obstacles_possible and obstacles != "none" and len(obstacles):
-            reason = f"the way of {self._task.name} is too short for obstacles; allowed: levels L0, L1, L2, R, S, T"
+            reason = f"the motion of {self._task.name} is too short for obstacles; allowed: levels L0, L1, L2, R, S, T"
             raise BadOption("level", reason)
 
     def _started(self, options: dict[str, Any]) -> Any:

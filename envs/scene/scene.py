@@ -64,7 +64,7 @@ def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...
     """Return the scene of a robot at a table with objects; compiled once per process.
 
     Args:
-        robot: of `ROBOTS`.
+        robot: one of `ROBOTS`.
         spec: scene contents besides robot and table.
         arms: names of the working arms, in the order of observations; None: the robot's first.
 
@@ -108,7 +108,7 @@ def robot_arm(robot: Robot, index: int = 0) -> Arm:
     """Return the kinematics of a robot's arm at the table, tcp between the finger pads.
 
     Args:
-        robot: of `ROBOTS`.
+        robot: one of `ROBOTS`.
         index: index among the arms that work by default.
     """
     return compiled_scene(robot).arms[index].arm

@@ -71,7 +71,7 @@ class ScheduledObstacle:
 
 
 def described(shape: Shape) -> np.ndarray:
-    """Return a shape's `obstacle_size` (3,) [m]: extents; radius, radius and length; or three times the radius.
+    """Return a shape's `obstacle_size` (3,) [m]: extents; radius, radius, length; or radius, radius, radius.
 
     Raises:
         TypeError: the shape is no box, capsule or sphere.

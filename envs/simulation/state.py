@@ -97,7 +97,7 @@ def read_arms(qpos, qvel, site_xmat, geom_xpos, chains, frames, index, homes, q,
         site_xmat: (nsite, 9) MuJoCo's site rotations.
         geom_xpos: (ngeom, 3) MuJoCo's geom positions [m].
         chains: kinematic chain of each arm, see `Arm.chain`.
-        frames: (dof, FRAME) workspace.
+        frames: (dof, `FRAME.width`) workspace.
         index: (n, 2 dof + 3) addresses of positions and velocities, the site and the two pads.
         homes: (n, 5) quaternion that decides the tcp's sign, and offset [m] from the pads' distance to their gap.
         q: (n, dof) result: joints [rad].

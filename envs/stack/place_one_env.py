@@ -110,8 +110,8 @@ class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
     `level="L1"`, `obstacles=None` (those of the level) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
     "forearm"`, `control_mode="ee_twist" | "joint_velocity"`, `reward="dense" | "sparse"`, `control_frequency=20` (10,
     20, 25 or 50: any that divides 500), `goal_form=False`, `end_on_success=None`, `render_mode=None | "rgb_array" |
-    "human"`, `arm=None`. `reset(options=...)` takes `level`, `obstacles`, `object_poses` (n, 7; of the held block
-    in the hand), `base_pose` (7,) of the lowest goal, and `joint_positions` (7,), which a block in the hand
+    "human"`, `arm=None`. `reset(options=...)` takes `level`, `obstacles`, `object_poses` (n, 7; a block in the hand
+    is held there), `base_pose` (7,) of the lowest goal, and `joint_positions` (7,), which a block in the hand
     follows.
 
     ## Version History

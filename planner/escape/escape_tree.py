@@ -66,7 +66,7 @@ def _outside(p, options):
 
 @inlined
 def lay_plane(g, tree, row, towards, options, step):
-    """Lay the plane of a node, through the obstacle closest to the tool.
+    """Lay a plane through a node, perpendicular to the line to the closest point of the tightest obstacle.
 
     Args:
         g: the tool among obstacles, see `tool_arrays`; left at the node (ROW.placed), its near pairs found.

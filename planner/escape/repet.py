@@ -82,7 +82,7 @@ class RepetSettings:
         shortcut: remove nodes that a clear edge can skip.
         pull_back: move children back to the shell.
         spacing: path length [m] between the poses of a detour.
-        bias: (3,) value of a metre in each world direction, in metres of path length.
+        bias: (3,) value of a meter in each world direction, in meters of path length.
         workspace: lowest and highest corner (2, 3) [m] of the nodes' positions, in the world.
         longest: largest number of poses of a path. A planner takes longer paths at even steps of their length, see
             `Plan.reduction`, and has room for as many poses again of blend and detours.
@@ -275,7 +275,7 @@ def escape_path(
     status, count, detours = escape(
         work, buffers[0], len(path), buffers[1], np.zeros(settings.longest), np.zeros(settings.candidates),
         np.zeros((settings.candidates, 8)), np.zeros((settings.levels + 3, 8)), tree, cells, heap, options,
-        np.array([float(seed % 2147483646) + 1.0]), log,
+        np.array([float(int(seed) % 2147483646) + 1.0]), log,
     )  # fmt: skip
     rows = int(log[last_tree(status, detours, len(log)), DETOUR_LOG.tree_rows])
     grown = EscapeTree.from_rows(tree[:rows]) if rows else None

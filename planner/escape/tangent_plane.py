@@ -8,8 +8,9 @@ from ..geometry import screw
 from ..jit import inlined, kernel
 
 SIDES = 8
+"""Number of regular children of a node: at the corners of a square and the middles of its sides."""
 COSINES = tuple(math.cos(0.25 * math.pi * k) for k in range(SIDES))
-"""Every node has this many regular children: at the corners of a square and the middles of its sides."""
+"""Cosines of the regular children's directions in the plane."""
 
 
 @kernel

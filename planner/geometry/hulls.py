@@ -115,7 +115,7 @@ def slices(points: np.ndarray, axis: np.ndarray, cuts: list[float]) -> list[np.n
 
 
 def directions(count: int = 600) -> np.ndarray:
-    """Return unit vectors (count + 6, 3) spread evenly over the sphere, plus and minus the coordinate axes included."""
+    """Return unit vectors (count + 6, 3) spread evenly over the sphere, including both directions of each axis."""
     height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     angle = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
     flat = np.sqrt(1.0 - height**2)

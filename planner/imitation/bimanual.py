@@ -114,10 +114,11 @@ def task_relative_path(
 
 
 def shared_translation(relative: PosePath, absolute: Pose, share: float = 0.5) -> tuple[PosePath, PosePath]:
-    """Share only the translation of a relative path: the left end effector keeps its attitude and stays upright.
+    """Share only the translation of a relative path: the left end effector keeps its attitude.
 
     `x_L = (R_a, p_a - share R_a (t_rho - t_rho(end)))`, `x_R = x_L rho`: the relative path is exact and its
-    translation is shared. Not in the paper; with a true beta = 1/2 both glasses tilt.
+    translation is shared; an upright left glass stays upright. Not in the paper; with a true beta = 1/2 both glasses
+    tilt.
 
     Args:
         relative: left_from_right, n poses. The translation is that of the right frame's origin.

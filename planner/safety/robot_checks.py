@@ -41,7 +41,7 @@ def checked_pairs(pairs: Sequence[tuple[int, int]], count: int) -> list[tuple[in
         count: number of capsules.
 
     Raises:
-        WrongType, BadShape, BadOption: not pairs of whole numbers from 0 to count - 1.
+        WrongType, BadShape, NotFinite, BadOption: not pairs of different whole numbers from 0 to count - 1.
     """
     if not len(pairs):
         return []
@@ -50,19 +50,26 @@ def checked_pairs(pairs: Sequence[tuple[int, int]], count: int) -> list[tuple[in
     if len(bad):
         k, place = (int(each) for each in bad[0])
         raise BadOption("pairs", f"pair {k} names capsule {array[k, place]:g}; there are capsules 0 to {count - 1}")
+    twice = np.flatnonzero(array[:, 0] == array[:, 1])
+    if len(twice):
+        raise BadOption("pairs", f"pair {twice[0]} names capsule {array[twice[0], 0]:g} twice")
     return [(int(one), int(other)) for one, other in array]
 
 
-def checked_contacts(allowed: Iterable[Sequence[str]]) -> tuple[tuple[str, str], ...]:
+def checked_contacts(allowed: Iterable[Sequence[str]], what: str = "allowed") -> tuple[tuple[str, str], ...]:
     """Return allowed contacts as pairs of names (of a capsule or held object, of an obstacle).
+
+    Args:
+        allowed: the pairs.
+        what: their name, for messages.
 
     Raises:
         WrongType: `allowed` holds something else than pairs of names.
     """
-    pairs = checked_items("allowed", allowed, Sequence)
+    pairs = checked_items(what, allowed, Sequence)
     for k, pair in enumerate(pairs):
         if isinstance(pair, str) or len(pair) != 2 or not all(isinstance(name, str) for name in pair):
-            raise WrongType(f"allowed[{k}]", pair, "a pair of names: part of the body, obstacle")
+            raise WrongType(f"{what}[{k}]", pair, "a pair of names: part of the body, obstacle")
     if all(type(pair) is tuple for pair in pairs):
         return cast(tuple[tuple[str, str], ...], pairs)
     return tuple((capsule, obstacle) for capsule, obstacle in pairs)

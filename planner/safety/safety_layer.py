@@ -46,8 +46,8 @@ class SafetySettings:
     """Distances and rates of the safety layer.
 
     Attributes:
-        distance: margin [m] between body and obstacles, for obstacles without a margin of their own. It includes
-            the measured tracking error of the arm.
+        distance: margin [m] between body and obstacles, for obstacles without a margin of their own. It must
+            include the measured tracking error of the arm.
         self_distance: margin [m] between parts of the robot.
         shell: distance [m] below which a pair is near and gets a bound.
         alpha: largest approach per slack [1/s].

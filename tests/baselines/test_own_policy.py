@@ -27,6 +27,11 @@ def wrong(task):
 def nothing(task, demonstration, settings):
     return None
 
+def greedy(task, demonstration, settings):
+    settings.pop("gain")
+    settings["list"].append(1)
+    return type("Policy", (), {"predict": lambda *_: None})()
+
 def choosy(task, demonstration, settings):
     from onedemo.planner.errors import BadOption
     raise BadOption("height", "is not a height")
@@ -118,6 +123,12 @@ def test_a_mistake_is_one_line(env, name, message):
 def test_its_own_complaint_is_left_as_it_is(env):
     with pytest.raises(BadOption, match="option 'height': is not a height"):
         made(env, "broken:choosy")
+
+
+def test_settings_that_it_changes_stay_as_they_are_in_the_config(env):
+    settings = {"gain": 2.0, "list": []}
+    made(env, "broken:greedy", settings)
+    assert settings == {"gain": 2.0, "list": []}
 
 
 def test_the_search_path_is_left_as_it_was(env):

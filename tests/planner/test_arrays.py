@@ -45,8 +45,10 @@ def test_a_read_only_array_is_copied_so_that_kernels_are_compiled_once():
         ("fast", WrongType, "speeds is 'fast', a str; expected an array of numbers"),
         ([[1.0], [1.0, 2.0]], WrongType, "speeds is [[1.0], [1.0, 2.0]], a list; expected an array of numbers"),
         (FIT + 1j, WrongType, "speeds is a ndarray; expected an array of numbers"),
+        (np.ma.masked_equal(FIT, 5.0), WrongType,
+         "speeds is a MaskedArray; expected an array of numbers, none of them masked"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_used_is_refused_in_one_line(value, error, message):
     with pytest.raises(error) as caught:
         checked_array("speeds", value, (3, 4))

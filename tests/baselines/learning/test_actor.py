@@ -124,9 +124,9 @@ def test_another_process_gives_the_same_bits_whatever_its_threads(threads):
     network, rng, digest = random_network((97, 256, 256, 7)), np.random.default_rng(0), hashlib.sha256()
     for _ in range(50):
         digest.update(network(rng.normal(size=97).astype(np.float32)).tobytes())
-    world_model = {**os.environ, "OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads, "PYTHONHASHSEED": "5"}
+    environment = {**os.environ, "OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads, "PYTHONHASHSEED": "5"}
     folder = str(Path(__file__).parents[2])
-    run = subprocess.run([sys.executable, "-c", code, folder], capture_output=True, text=True, env=world_model)
+    run = subprocess.run([sys.executable, "-c", code, folder], capture_output=True, text=True, env=environment)
     assert run.stdout.strip() == digest.hexdigest(), run.stderr
 
 

@@ -1,4 +1,4 @@
-"""What each other way to move a leg is, and is not: properties of the paths, and an independent judge of the joints."""
+"""What each baseline motion is, and is not: properties of the paths, and an independent judge of the joints."""
 
 from __future__ import annotations
 

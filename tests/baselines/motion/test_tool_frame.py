@@ -1,4 +1,4 @@
-"""Level T: legs moved in another frame of the hand. Screws do not notice, and nothing else of a leg does."""
+"""Level T: motions in another frame of the hand. Screws do not notice, and nothing else of a motion does."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_a_plan_seen_from_elsewhere_and_back_is_the_plan():
 
 
 def followed(name, go, tool=TOOL):
-    """Joints (t, dof) of a leg that is followed."""
+    """Joints (t, dof) of a motion that is followed."""
     arm, body, home = panda()
     settings = settings_of(name, {})
     follower = ToolFrameMotion(settings.motion_method, tool).follower(arm, body, settings.reactive)

@@ -74,7 +74,7 @@ def test_what_is_held_counts():
 
 
 def test_a_goal_from_which_the_task_goes_on_beats_one_that_is_nearer():
-    """The next leg can be done after one of the goals only: that one is taken, whatever its margin."""
+    """The next motion can be done after one of the goals only: that one is taken, whatever its margin."""
     arm, body, home = panda()
     first = choose(arm, SETTINGS, home, a_leg()).index
     far = (at([3.0, 0.0, 1.0], goals()[0].quaternion),)

@@ -55,7 +55,7 @@ def run(tmp_path_factory):
 
 
 def test_the_report_is_the_golden_one(run):
-    """Renew it with `python tests/helpers/example_runs.py`, and read what has changed."""
+    """Renew it with `PYTHONPATH=tests python -m helpers.example_runs`, and read what has changed."""
     assert (run / "report.md").read_text(encoding="utf-8") == GOLDEN.read_text(encoding="utf-8")
 
 

@@ -102,7 +102,7 @@ def events(folder, name):
     """Steps and values of a scalar, as TensorBoard shows them."""
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    assert not [path for path in folder.iterdir() if path.is_dir()], "a leg that is over is shown as a run of its own"
+    assert not [path for path in folder.iterdir() if path.is_dir()], "a finished round is shown as a run of its own"
     seen = EventAccumulator(str(folder))
     seen.Reload()
     scalars = seen.Scalars(name)

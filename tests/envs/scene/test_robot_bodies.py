@@ -7,6 +7,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from helpers.arms import table_panda
 
 from onedemo.envs.scene.robot_bodies import fitted_bodies, robot_body
 from onedemo.envs.scene.robots import ROBOTS
@@ -39,6 +40,18 @@ def test_the_shipped_capsules_hold_every_corner_of_the_links(robot):
             corners = link_corners(model, data, int(model.joint(name).bodyid[0]))
             if len(corners):
                 assert outside(body, index.arm, q, joint, corners) <= 1e-5, name
+
+
+def test_the_planners_tests_use_the_panda_that_is_shipped():
+    arm, body, _ = table_panda()
+    robot = ROBOTS["Panda"]
+    mine = compiled_scene(robot).arms[0].arm
+    np.testing.assert_allclose(arm.chain, mine.chain, atol=1e-12)
+    np.testing.assert_array_equal(
+        [arm.lower, arm.upper, arm.velocity_limits], [mine.lower, mine.upper, mine.velocity_limits]
+    )
+    np.testing.assert_array_equal(body.rows, robot_body(robot).rows)
+    assert (arm.joint_names, body.names) == (mine.joint_names, robot_body(robot).names)
 
 
 def link_corners(model, data, body):

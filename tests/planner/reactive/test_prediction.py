@@ -58,7 +58,7 @@ def crossing(seed: int, speed: float) -> Obstacle:
 
 
 def followed(world, settings=None, ticks=1500):
-    """The commands, and the joints of every tick, of the leg in a world that is a function of the tick."""
+    """The commands, and the joints of every tick, of the motion in a world that is a function of the tick."""
     planner = ReactivePlanner(*robot(), settings)
     planner.go(sideways())
     q, commands, trace = START.copy(), [], [START]

@@ -1,4 +1,4 @@
-"""Following a leg among obstacles that come, go, move and stay; the arm is ideal, the judge is slack_at."""
+"""Following a motion among obstacles that come, go, move and stay; the arm is ideal, the judge is slack_at."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def robot():
 
 
 def sideways(way=0.35):
-    """A straight leg of the tcp along y."""
+    """A straight motion of the tcp along y."""
     arm, _ = robot()
     start = arm.fk(START)
     return screw_path(start, Pose.from_position_quaternion([0.0, way, 0.0]) @ start, 0.005)

@@ -514,6 +514,8 @@ def test_bad_calls_are_refused_by_name():
     for pair in ((0, 1), (-1, 0), (0, 0.5), (0, 1e9)):
         with pytest.raises(BadOption, match=r"pair 0 names capsule .*; there are capsules 0 to 0"):
             SafetyLayer([gantry()], [BALL], [], DT, pairs=[pair])
+    with pytest.raises(BadOption, match="pair 0 names capsule 0 twice"):
+        SafetyLayer([gantry()], [BALL], [], DT, pairs=[(0, 0)])
     for allowed in ([("hand",)], ["ab"], [("hand", 3)]):
         with pytest.raises(WrongType, match=r"allowed\[0\] is .*; expected a pair of names"):
             SafetyLayer([gantry()], [BALL], [], DT, allowed=allowed)
