@@ -196,8 +196,8 @@ class SceneConfig(Strict):
         goal: goal pose of the tcp, as a pose vector or a table.
         obstacles: obstacles in the world.
         held: object in the hand, or None.
-        allowed: pairs of a part of the body (or a held object) and an obstacle that may touch, but for 5 mm no deeper than
-            at the ends of the motion.
+        allowed: pairs of a part of the body (or a held object) and an obstacle that may touch, but for 5 mm no deeper
+            than at the ends of the motion.
         settings: settings of the planner, nested; see `PlanSettings`.
         seed: seed of the planner's random choices.
     """

@@ -18,7 +18,7 @@ ROW = re.compile(r"^\| `([a-z_.]+)` \| (.+?) \| (.+?) \|$", re.MULTILINE)
 FLOW = re.compile(r"^- \*\*.+?\*\*: (.+)$", re.MULTILINE)
 ARROW = re.compile(r" —`([^`]+)`→ ")
 CODE = re.compile(r"`([^`\n]+)`")
-FILE = re.compile(r"[\w.-]+(/[\w.-]+)+/?|[\w-]+/|\w+\.(py|md|svg|yaml|json|toml)")
+FILE = re.compile(r"[\w.-]+(/[\w.-]+)+/?|[\w-]+/|\w+\.(py|md|svg|yaml|json|toml|txt)")
 NAME = re.compile(r"[A-Za-z_]\w*(\.\w+)*")
 
 
