@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...envs.scene.robots import ROBOTS
-from ...planner import Body, Obstacle, Pose, Sphere
+from ...planner import Arm, Body, Obstacle, Pose, Sphere
 from ...planner.collision import clearance
 from ...planner.collision.capsule_placement import place_capsules
 from ...planner.collision.robot_arrays import ROW, robot_arrays
 from ...planner.geometry.shapes import pack
-from ...planner.robot.arm import Arm
 from ...planner.robot.body import BODY
 from ...planner.robot.joint_frames import joint_frames, moved
 from .measuring import Row, row, seconds_per_call
