@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.scene.robots import ROBOTS
+from ...envs import ROBOTS
 from ...planner import Arm, Body, Obstacle, Pose, Sphere
 from ...planner.collision import clearance
 from ...planner.collision.capsule_placement import place_capsules
