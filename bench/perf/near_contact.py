@@ -20,7 +20,8 @@ from .measuring import Row, row, seconds_per_call
 NAME = "arm of hulls near 12 balls / MuJoCo's collisions"
 BALLS, RADIUS = 12, 0.05
 GAP, WIDE = 0.005, 0.02
-"""Distance [m] of each ball from the hull nearest to it; distance within which MuJoCo looks for contacts."""
+"""Distance [m] of each ball from a corner of a hull, at least half of it from all hulls; distance within which MuJoCo looks
+for contacts."""
 
 
 def _near_contact() -> Row:
@@ -63,7 +64,7 @@ def _hulls(arm: Arm, body: Body, q: np.ndarray) -> list[np.ndarray]:
 
 
 def _balls(arm: Arm, body: Body, q: np.ndarray, hulls: list[np.ndarray]) -> tuple[Obstacle, ...]:
-    """Return balls at the gap from corners of hulls, and no closer to any."""
+    """Return balls at the gap from corners of hulls, and at least half of it from all hulls."""
     rng, found = np.random.default_rng(0), []
     while len(found) < BALLS:
         corners = hulls[int(rng.integers(len(hulls)))]

@@ -148,8 +148,8 @@ class Planner(MotionPlanner):
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
             elif failed is None:
-                reason = DEEP_CONTACT if arrived else WHY.get(status, "") or IK_OR_LIMIT
-                failed = reason, self._detail(run, status, attempt.factor)
+                why = WHY.get(status, "") or IK_OR_LIMIT, self._detail(run, status, attempt.factor)
+                failed = (DEEP_CONTACT, "") if arrived else why
         if best is None:
             assert failed is not None
             best = self._failed(run, *failed, tried=True)

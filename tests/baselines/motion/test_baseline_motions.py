@@ -10,7 +10,8 @@ from helpers.random_scenes import at, demonstrated, judged, panda, problem
 from onedemo.baselines import extras
 from onedemo.baselines.errors import MissingExtra
 from onedemo.baselines.factory import settings_of
-from onedemo.baselines.motion.generated_plan import NO_PATH
+from onedemo.baselines.motion.generated_follower import GeneratedFollower
+from onedemo.baselines.motion.generated_plan import NO_PATH, PATH
 from onedemo.baselines.motion.tool_obstacles import ToolObstacles
 from onedemo.baselines.paths_only import PATH_MAKERS, made_path, motion_planner
 from onedemo.configs.errors import BadConfig
@@ -20,6 +21,7 @@ from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Obstacle, Sphere
 from onedemo.planner.imitation.tsia import final_path, guide_index, imitated_path
 from onedemo.planner.planning.planning_scene import PlanningScene, SceneTemplate
+from onedemo.planner.reactive.command import ReactiveSettings
 from onedemo.planner.safety.safety_layer import SafetySettings
 
 TOOL = point_tool(0.05)
@@ -285,6 +287,19 @@ def test_a_path_that_ends_before_the_goal_is_no_plan():
     plan = planned("potential", [ball])
     if not plan.success:
         assert plan.reason in (NO_PATH, "ik_or_limit") and len(plan.joints) == 1
+
+
+@pytest.mark.parametrize("name", ["replay", "potential"])
+def test_a_generated_path_is_followed_even_if_planning_did_not_follow_it(name):
+    """Its closed loop may still arrive; a failed plan of the method has no path to follow."""
+    arm, body, home = panda()
+    far = motion_planner(name, arm, body, None).plan(demonstrated(), home, at([2.0, 0.0, 0.0]) @ PLACE)
+    assert not far.success and far.how == PATH
+    follower = GeneratedFollower(arm, body, ReactiveSettings(), settings_of(name).generator)
+    follower.follow(far)
+    assert follower.step(home).state == "following"
+    with pytest.raises(PlanFailed, match="plan_failed"):
+        follower.follow(far._replace(how="direct"))
 
 
 def test_a_blocked_path_of_the_method_is_a_reason():
