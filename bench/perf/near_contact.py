@@ -20,8 +20,7 @@ from .measuring import Row, row, seconds_per_call
 NAME = "arm of hulls near 12 balls / MuJoCo's collisions"
 BALLS, RADIUS = 12, 0.05
 GAP, WIDE = 0.005, 0.02
-"""Distance [m] of each ball from a corner of a hull, at least half of it from all hulls; distance within which MuJoCo looks
-for contacts."""
+"""Distance [m] of each ball from a corner of a hull, half of it from all; distance of a contact of MuJoCo."""
 
 
 def _near_contact() -> Row:
