@@ -1,5 +1,5 @@
 # make demo    install into .venv, then stack three blocks from one demonstration
-# make test    install into .venv, then run the tests (20 to 25 minutes on 2 cores)
+# make test    install into .venv, then run the tests (about 20 minutes on 2 cores)
 # make check   lint, types and tests
 
 PYTHON ?= python3
