@@ -13,6 +13,7 @@ from .console import console, labeled, missing_library
 from .interruption import INTERRUPTED
 from .mbm.options import mbm
 from .robot import command as robot_commands
+from .survey.options import survey
 
 BAD_INPUT = 2
 USAGE: Any = typer.BadParameter.__base__
@@ -25,6 +26,7 @@ app = typer.Typer(
     add_completion=False,
 )
 app.add_typer(demo_commands.app, name="demo")
+robot_commands.app.command()(survey)
 app.add_typer(robot_commands.app, name="robot")
 
 

@@ -43,6 +43,15 @@ def shipped_training(name: str) -> Path:
     return _shipped("training", "train", ".yaml", name)
 
 
+def shipped_robots(name: str) -> Path:
+    """Return the file of a shipped list of robots, like "public".
+
+    Raises:
+        UnknownName: no such list; the message lists the known ones.
+    """
+    return _shipped("list of robots", "robots", ".yaml", name)
+
+
 def shipped_actor(name: str) -> Path:
     """Return the .json file of a shipped actor, like "sac-stack-Panda".
 

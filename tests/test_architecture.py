@@ -32,7 +32,7 @@ ORDER = {
     "bench": """
         console atomic_files statistics provenance interruption task_table method_table demonstrations
         drawing document robot metrics plan workers episodes report geometric run task_pages reproduce train
-        curves perf mbm cli
+        curves perf mbm survey cli
     """,
     "face": "former_paths",
 }
@@ -44,7 +44,7 @@ SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
 READERS = {"planner/models/urdf_model.py", "planner/judge/geometry.py"}
 USERS = {
     "robosuite": {"envs/scene/robosuite_model.py", "bench/perf/command.py"},
-    "pinocchio": {*READERS, "bench/perf/peers.py", "bench/mbm/mesh_judge.py"},
+    "pinocchio": {*READERS, "bench/perf/peers.py", "bench/robot/urdf_solids.py"},
     "numba": {"planner/jit.py"},
 }
 """Who alone imports a heavy library."""

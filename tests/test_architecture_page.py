@@ -67,8 +67,9 @@ def libraries() -> set[str]:
 def is_known(name: str) -> bool:
     """True if a dotted name is of the code, its tests or a library that it uses; or a command."""
     if name.startswith("onedemo "):
-        command = name.split()[1]
-        return bool({f"bench.cli.{command}", f"bench.{command}.options.{command}"} & defined().keys())
+        words = name.split()[1:3]  # of a group of commands, like `robot`, the second names it
+        known = {path for word in words for path in (f"bench.cli.{word}", f"bench.{word}.options.{word}")}
+        return bool(known & defined().keys())
     first, _, rest = name.removeprefix("onedemo.").partition(".")
     if first in libraries():
         return not rest or hasattr(import_module(first), rest)

@@ -16,12 +16,13 @@ from ..atomic_files import canonical, sha256_of, write_whole
 from ..console import console
 from ..episodes.run_folder import alone
 from ..interruption import ended
-from .mesh_judge import STEP, MeshJudge
+from ..robot.mesh_judge import STEP, MeshJudge
 from .moveit_files import read_archive
 from .problems import Problem, read_problems
 from .robot import RobotFiles, TrackRobot, robot_of, widened
 from .solvers import OURS, Solve, solvers_of
 from .table import Row, page, row_of, summaries
+from .track_judge import judge_of
 
 ROWS, CONDITIONS, PAGE, TABLE = "rows.jsonl", "conditions.json", "mbm.md", "mbm.json"
 
@@ -186,7 +187,7 @@ def completed(
     ]
     todo = [(each, missing) for each, missing in todo if missing]
     if todo:
-        judge = MeshJudge(robot)
+        judge = judge_of(robot)
         warm_up(problems[0], robot, solvers)
         with (folder / ROWS).open("ab") as out, Progress(console=console(stderr=True, quiet=quiet)) as progress:
             task = progress.add_task("problems", total=len(todo))

@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".pdf", ".svg")
 """Allowed suffixes of a picture."""
-app = typer.Typer(help="Inspect a robot's file.", no_args_is_help=True, rich_markup_mode="markdown")
-
-
-@app.callback()
-def _group() -> None:
-    """Keep `check` a command of its own, though there is no other."""
+app = typer.Typer(help="Inspect robots' files.", no_args_is_help=True, rich_markup_mode="markdown")
 
 
 @app.command()

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from ...planner import Arm, Body, Pose
 from ...planner.errors import BadModel, ModelWarning
+from ...planner.fitting.kept_bodies import kept_body_of
 from ...planner.fitting.link_capsules import body_of
 from ...planner.fitting.mujoco_parts import parts_from_mujoco
 from ...planner.fitting.robot_parts import PartsRequest, ReadRobot, pieces_of_links
@@ -71,8 +72,50 @@ class LoadedRobot(NamedTuple):
     ignored: tuple[tuple[str, str], ...]
 
 
+class ReadFile(NamedTuple):
+    """A robot's file that was read, before its geometry is covered.
+
+    Attributes:
+        arm: the arm.
+        parts: what the body will be made of.
+        tool: name of the tool frame.
+        ignored: pairs of parts of the body that the SRDF exempts.
+        visuals: whether links without collision geometry are covered by their visual geometry.
+    """
+
+    arm: Arm
+    parts: ReadRobot
+    tool: str
+    ignored: tuple[tuple[str, str], ...]
+    visuals: bool
+
+    def covered(self, *, anew: bool = False) -> LoadedRobot:
+        """Return the robot with its body; what is doubtful stands in the arm's report.
+
+        Args:
+            anew: fit the body, even if it was fitted before.
+
+        Raises:
+            BadModel: its geometry cannot be covered.
+        """
+        fit = body_of if anew else kept_body_of
+        body, doubts = fit(self.parts.robot, self.arm, None)
+        body = body.ignoring(*self.ignored)
+        report = _merged(self.arm.report, self.parts.report, doubts, visuals=self.visuals)
+        return LoadedRobot(replace(self.arm, report=report), body, self.parts, self.tool, self.ignored)
+
+
 def load_robot(request: RobotRequest) -> LoadedRobot:
     """Read arm and body of a robot; what is doubtful stands in the arm's report.
+
+    Raises:
+        BadModel: the file, a name in the request, or the SRDF cannot be used.
+    """
+    return read_robot(request).covered()
+
+
+def read_robot(request: RobotRequest) -> ReadFile:
+    """Read a robot's file.
 
     Raises:
         BadModel: the file, a name in the request, or the SRDF cannot be used.
@@ -82,9 +125,7 @@ def load_robot(request: RobotRequest) -> LoadedRobot:
         arm, parts, tool = (_mujoco if kind_of(request.file) == "mujoco" else _urdf)(request)
     pairs = {} if request.srdf is None else read_srdf(request.srdf)
     ignored = sorted(ignored_pieces(pairs, pieces_of_links(parts, arm.dof), request.srdf or "") if pairs else ())
-    body = body_of(parts.robot, arm, None).ignoring(*ignored)
-    report = _merged(arm.report, parts.report, visuals=request.visuals)
-    return LoadedRobot(replace(arm, report=report), body, parts, tool, tuple(ignored))
+    return ReadFile(arm, parts, tool, tuple(ignored), request.visuals)
 
 
 def kind_of(file: Path) -> str:
@@ -153,7 +194,7 @@ def _parts_request(request: RobotRequest, arm: Arm) -> PartsRequest:
     return PartsRequest(others, request.visuals)
 
 
-def _merged(arm: ModelReport, body: ModelReport, *, visuals: bool) -> ModelReport:
-    """Return the findings of both readers; the body's know more about geometry."""
+def _merged(arm: ModelReport, body: ModelReport, doubts: Sequence[str], *, visuals: bool) -> ModelReport:
+    """Return the findings of both readers and of the fit; the body's reader knows more about geometry."""
     unused = dict.fromkeys((*body.unused, *(line for line in arm.unused if not (visuals and line.startswith(UNSEEN)))))
-    return ModelReport(arm.source, {**arm.held, **body.held}, tuple(unused), (*arm.warnings, *body.warnings))
+    return ModelReport(arm.source, {**arm.held, **body.held}, tuple(unused), (*arm.warnings, *body.warnings, *doubts))

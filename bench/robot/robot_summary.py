@@ -67,16 +67,22 @@ def reach_of(arm: Arm) -> float:
 def volumes_of(robot: LoadedRobot) -> list[PieceVolume]:
     """Return the volumes of every part of a body, base first."""
     body, read = robot.body, robot.parts.robot
-    places = places_of(read.parts, robot.arm.dof)
+    places, swept = places_of(read.parts, robot.arm.dof), swept_parts(robot)
     out = []
     for name in dict.fromkeys(body.names):
         rows = body.rows[np.array(body.names) == name]
         cover: Cover = [(row[BODY.a : BODY.b], row[BODY.b : BODY.radius], float(row[BODY.radius])) for row in rows]
         parts = [part for part, place in zip(read.parts, places, strict=True) if place.piece == name]
-        swept = name == "fingers" or any(part.joints for part in parts)
-        solid = np.nan if swept else sum(volume_of(geometry) for part in parts for geometry in part.geometry)
+        solid = np.nan if name in swept else sum(volume_of(geometry) for part in parts for geometry in part.geometry)
         out.append(PieceVolume(name, len(rows), union_volume(cover), float(solid)))
     return out
+
+
+def swept_parts(robot: LoadedRobot) -> set[str]:
+    """Return the names of the parts of a body that are covered in every position of joints that are not the arm's."""
+    read = robot.parts.robot
+    names = [place.piece for place in places_of(read.parts, robot.arm.dof)]
+    return {name for part, name in zip(read.parts, names, strict=True) if name == "fingers" or (name and part.joints)}
 
 
 def volume_of(geometry: Geometry) -> float:

@@ -6,13 +6,16 @@ Not in the paper: the paper moves a point.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..models.model_report import ModelReport
 from ..models.srdf import ignored_pieces, read_srdf
 from ..robot.arm import Arm
 from ..robot.body import Body
-from .link_capsules import Split, body_of
+from .kept_bodies import kept_body_of
+from .link_capsules import Split
 from .mujoco_parts import parts_from_mujoco
 from .robot_parts import PartsRequest, pieces_of_links
 from .urdf_parts import parts_from_urdf
@@ -53,8 +56,9 @@ def body_from_mujoco(
         UnknownName: a piece in `split` that the arm lacks.
     """
     read = parts_from_mujoco(model, arm, joint_names, PartsRequest(locked or {}, visuals))
-    read.report.warn()
-    return body_of(read.robot, arm, split, exact=exact)
+    body, doubts = kept_body_of(read.robot, arm, split, exact=exact)
+    _with(read.report, doubts).warn()
+    return body
 
 
 def body_from_urdf(
@@ -90,8 +94,13 @@ def body_from_urdf(
         UnknownName: a piece in `split` that the arm lacks.
     """
     read = parts_from_urdf(path, arm, package_dirs, PartsRequest(locked or {}, visuals))
-    read.report.warn()
-    body = body_of(read.robot, arm, split, exact=exact)
+    body, doubts = kept_body_of(read.robot, arm, split, exact=exact)
+    _with(read.report, doubts).warn()
     if srdf is None:
         return body
     return body.ignoring(*sorted(ignored_pieces(read_srdf(srdf), pieces_of_links(read, arm.dof), srdf)))
+
+
+def _with(report: ModelReport, doubts: tuple[str, ...]) -> ModelReport:
+    """Return a report with further warnings."""
+    return replace(report, warnings=(*report.warnings, *doubts))

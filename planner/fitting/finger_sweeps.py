@@ -7,12 +7,23 @@ import math
 import numpy as np
 
 from ..errors import BadModel, UnfitShape
+from ..geometry.convex_pieces import rounded_hull
 from ..geometry.hulls import corner_points
 from ..geometry.shapes import Sphere, hull_corners
 from ..models.model_joints import SLIDES, TURNS, ModelJoint
 from ..robot.joint_frames import moved
 from .robot_model import BodyPart, RobotModel, joined
 
+MANY = 5000
+"""Number of corners above which a sweep is simplified."""
+ROUNDING = 5e-4
+"""Distance [m] by which a simplified sweep is larger, unless it is too round for that."""
+GOLDEN = 0.5 + math.sqrt(1.25)
+"""The golden ratio."""
+ICOSAHEDRON = np.array(
+    [np.roll([0.0, y, z * GOLDEN], turn) for turn in range(3) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+) * (math.sqrt(3.0) / GOLDEN**2)
+"""Corners (12, 3) of the solid around a ball of radius 1."""
 STEP = math.radians(15.0)
 """Largest step [rad] in which a revolute finger joint is swept."""
 
@@ -94,7 +105,14 @@ def sweep(joint: ModelJoint, points: np.ndarray, source: str, name: str) -> np.n
 
 
 def _fewer(points: np.ndarray) -> np.ndarray:
+    """Return points whose hull contains some points: the corners of their hull, or few around it."""
     try:
-        return points[hull_corners(points)] if len(points) > 8 else points
+        corners = points[hull_corners(points)] if len(points) > 8 else points
     except UnfitShape:
         return points
+    if len(corners) <= MANY:
+        return corners
+    # sweeps of sweeps would have some hundred thousand corners: balls about few of them, each in a solid of 12 corners
+    few, radius = rounded_hull(corners, ROUNDING)
+    around = (few[:, None] + radius * ICOSAHEDRON).reshape(-1, 3)
+    return around[hull_corners(around)]

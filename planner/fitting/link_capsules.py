@@ -13,10 +13,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import BadModel, UnfitShape, UnknownName
-from ..geometry.capsule_cover import fitted_capsules, strips
+from ..geometry.capsule_cover import fitted_capsules, rough_capsule, strips
 from ..geometry.convex_pieces import rounded_hull
 from ..geometry.hulls import Cover, sticks_out, union_volume
 from ..geometry.pose import Pose
+from ..geometry.shapes import hull_corners
 from ..robot.arm import Arm
 from ..robot.body import MAX_CAPSULES, Body, Hull
 from ..robot.joint_frames import joint_frames, moved
@@ -37,12 +38,14 @@ SAME = 1e-6
 """Tolerance [m, rad] within which joints of a model and of the arm coincide."""
 BULGES = (1.02, 1.25, 2.0, 5.0, np.inf)
 """Volumes of a hull of several elements, as multiples of theirs, that are tried until the pieces are few enough."""
+THIN = 1e-3
+"""Share of the largest extent of points below which the smallest one may be none."""
 ROUNDING = 5e-4
 """Largest distance [m] that the hull of a piece with many corners may stand off the piece."""
 
 
-def body_of(robot: RobotModel, arm: Arm, split: Split, *, exact: bool = True) -> Body:
-    """Cover a robot's parts, named and placed as `body_readers` describes.
+def body_of(robot: RobotModel, arm: Arm, split: Split, *, exact: bool = True) -> tuple[Body, tuple[str, ...]]:
+    """Cover a robot's parts, named and placed as `body_readers` describes; and say what is doubtful, a line each.
 
     Args:
         robot: the model that was read.
@@ -60,15 +63,16 @@ def body_of(robot: RobotModel, arm: Arm, split: Split, *, exact: bool = True) ->
     _check_numbers(robot)
     covering = _Covering(robot.source, split)
     if not exact:
-        return covering.body(whole_pieces(robot, world, frames), hulls=False)
+        return covering.body(whole_pieces(robot, world, frames), hulls=False), ()
     pieces: list[Piece] = []
     for bulge in BULGES:
         pieces = convex_link_pieces(robot, world, frames, bulge)
         if len(pieces) <= MAX_CAPSULES:
             break
-    covering.body(pieces)  # refuses what encloses no volume, which has no surface
+    covering.check(pieces)
     truth = MeshDistances(arm, pieces)
-    return possible_contacts(arm, refined(arm, pieces, truth, covering.body, MAX_CAPSULES), truth)
+    pieces = refined(arm, pieces, truth, covering.rough, MAX_CAPSULES)
+    return possible_contacts(arm, covering.body(pieces), pieces, truth)
 
 
 def _check_same(robot: RobotModel, arm: Arm, world: list[Pose], frames: list[Pose]) -> None:
@@ -95,18 +99,43 @@ class _Covering:
 
     def __init__(self, source: str, split: Split):
         self._source, self._split = source, split
-        self._known: dict[tuple[int, bool], tuple[Piece, Cover, Hull | None]] = {}
+        self._known: dict[tuple[int, bool], tuple[Piece, Cover]] = {}
+        self._hulls: dict[int, tuple[Piece, Hull | None]] = {}
+
+    def check(self, pieces: list[Piece]) -> None:
+        """Refuse pieces that enclose no volume: they have no surface."""
+        for piece in pieces:
+            try:
+                if len(piece.geometry.points) and _is_thin(piece.geometry.points):
+                    hull_corners(piece.geometry.points)
+            except UnfitShape as error:
+                raise BadModel(self._source, piece.name, f"{FLAT}: {error.reason}") from None
 
     def body(self, pieces: list[Piece], *, hulls: bool = True) -> Body:
-        """Return the body of pieces; with hulls, and with one capsule per piece if more would be too many."""
+        """Return the body of pieces; with hulls, and with one capsule per piece if more may be too many."""
         names = {piece.name for piece in pieces}
         if isinstance(self._split, Mapping) and set(self._split) - names:
             raise UnknownName("link to split", min(set(self._split) - names), sorted(names))
-        covers = [self._of(piece, few=False) for piece in pieces]
-        if hulls and sum(len(cover) for cover, _ in covers) > MAX_CAPSULES:
-            covers = [self._of(piece, few=True) for piece in pieces]
+        few = hulls and 2 * len(pieces) > MAX_CAPSULES
+        covers = [self._of(piece, few=few, hulls=hulls) for piece in pieces]
+        if hulls and sum(map(len, covers)) > MAX_CAPSULES:
+            covers = [self._of(piece, few=True, hulls=True) for piece in pieces]
+        return self._laid(pieces, covers, hulls=hulls)
+
+    def rough(self, pieces: list[Piece]) -> Body:
+        """Return the body of pieces with their hulls, in capsules that are found at once."""
+        return self._laid(pieces, [self._rough_cover(piece) for piece in pieces], hulls=True)
+
+    def _rough_cover(self, piece: Piece) -> Cover:
+        hull = self._hull(piece)
+        found, more = ([], 0.0) if hull is None else (rough_capsule(hull.corners), hull.rounding)
+        return piece.geometry.exact + [(a, b, radius + more) for a, b, radius in found]
+
+    def _laid(self, pieces: list[Piece], covers: list[Cover], *, hulls: bool) -> Body:
         rows, labels, laid = [], [], []
-        for piece, (cover, hull) in zip(pieces, covers, strict=True):
+        for piece, cover in zip(pieces, covers, strict=True):
+            hull = self._hull(piece) if hulls else None
+            hull = None if hull is None else hull.moved(piece.pose)  # capsules of a piece share it
             for a, b, radius in cover:
                 rows.append([piece.frame, *moved(piece.pose, a), *moved(piece.pose, b), radius])
                 labels.append(piece.name)
@@ -118,25 +147,41 @@ class _Covering:
             raise BadModel(self._source, "collision geometry", reason)
         return Body(np.array(rows), tuple(labels), hulls=tuple(laid) if hulls else ())
 
-    def _of(self, piece: Piece, *, few: bool) -> tuple[Cover, Hull | None]:
+    def _hull(self, piece: Piece) -> Hull | None:
+        """Return the hull of a piece in its own frame."""
+        if id(piece) not in self._hulls:
+            points = piece.geometry.points
+            self._hulls[id(piece)] = piece, Hull(*rounded_hull(points, ROUNDING)) if len(points) else None
+        return self._hulls[id(piece)][1]
+
+    def _of(self, piece: Piece, *, few: bool, hulls: bool) -> Cover:
+        """Return the capsules of a piece; around its hull, if it has one: its corners are few."""
         key = id(piece), few
         if key not in self._known:
-            points = piece.geometry.points
-            hull = Hull(*rounded_hull(moved(piece.pose, points), ROUNDING)) if len(points) else None
-            self._known[key] = piece, _cover(piece, 1 if few else self._split, self._source), hull
-        return self._known[key][1:]
+            hull = self._hull(piece) if hulls else None
+            points = piece.geometry.points if hull is None else hull.corners
+            cover = _cover(piece, points, 1 if few else self._split, self._source)
+            more = 0.0 if hull is None else hull.rounding
+            self._known[key] = piece, piece.geometry.exact + [(a, b, radius + more) for a, b, radius in cover]
+        return self._known[key][1]
 
 
-def _cover(piece: Piece, split: Split, source: str) -> Cover:
-    exact, points = piece.geometry.exact, piece.geometry.points
+def _is_thin(points: np.ndarray) -> bool:
+    """Return whether points (n, 3) may lie in a plane: a look that is cheaper than their hull."""
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return len(extents) < 3 or bool(extents[2] <= THIN * extents[0])
+
+
+def _cover(piece: Piece, points: np.ndarray, split: Split, source: str) -> Cover:
+    """Return capsules around points (n, 3) [m] of a piece."""
     if not len(points):
-        return exact
+        return []
     count = split.get(piece.name) if isinstance(split, Mapping) else split
     try:
         if count is not None:
-            return exact + fitted_capsules(points, count)
+            return fitted_capsules(points, count)
         if piece.name == "fingers":
-            return exact + strips(points, FINGER_EXCESS)
+            return strips(points, FINGER_EXCESS)
         fit, pays = fitted_capsules(points, 1), True
         while pays and len(fit) < 3:
             finer = fitted_capsules(points, len(fit) + 1)
@@ -145,4 +190,4 @@ def _cover(piece: Piece, split: Split, source: str) -> Cover:
             fit = finer if pays else fit
     except UnfitShape as error:
         raise BadModel(source, piece.name, f"{FLAT}: {error.reason}") from None
-    return exact + fit
+    return fit

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
@@ -23,16 +24,16 @@ from ..jit import inner, kernel
 from ..robot.arm import Arm
 from ..robot.body import BODY, Body
 from ..robot.kinematics import CHAIN, REVOLUTE
+from .link_pieces import SWEPT, Piece, owners_of
 from .mesh_distances import MeshDistances
 
 POSTURES, TRIES, STARTS = 4000, 300, 5
 """Random postures that are looked at; steps of a descent to the least distance of a pair, and number of descents."""
 TOUCH = 0.002
 """Distance [m] that two parts never fall below if they count as unable to touch: for a model's own inaccuracy."""
-NEAR, MOSTLY = 0.01, 0.95
-"""Distance [m] below which two parts, in this share of all postures, count as resting against each other."""
-
-
+NEAR, MOSTLY, RESTING = 0.01, 0.95, 400
+"""Distance [m] below which two parts, in this share of all postures, count as resting against each other; and number
+of postures in which their meshes are asked about it."""
 SHARE = 0.5
 """Share of the distance of two parts in the median posture that they are asked to keep at most."""
 
@@ -50,11 +51,15 @@ class Survey(NamedTuple):
     pairs: np.ndarray
     distances: np.ndarray
 
-    def by_parts(self, body: Body) -> dict[tuple[str, str], np.ndarray]:
-        """Return the pairs' indices for every pair of names of parts."""
+    def by_parts(self, labels: Sequence[str]) -> dict[tuple[str, str], np.ndarray]:
+        """Return the pairs' indices for every pair of parts.
+
+        Args:
+            labels: (m,) of the part that each capsule covers, see `Piece.label`.
+        """
         found = defaultdict(list)
         for k, (i, j) in enumerate(self.pairs):
-            found[body.names[i], body.names[j]].append(k)
+            found[labels[i], labels[j]].append(k)
         return {names: np.array(indices) for names, indices in found.items()}
 
 
@@ -115,13 +120,41 @@ def survey_of(arm: Arm, body: Body, count: int = POSTURES) -> Survey:
     pairs = np.array(some, dtype=int).reshape(-1, 2)
     rng = np.random.default_rng(0)
     postures = rng.uniform(*_ranges(arm), (count, arm.dof))
+    work = robot_arrays((arm,), (body,), pack(()))
+    return Survey(postures, pairs, distances_of_pairs(work, postures, pairs))
+
+
+def distances_of_pairs(work: np.ndarray, postures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return the distances (m, n) [m] of an arm's own capsules, by the hulls where they are below `CLOSE`.
+
+    Args:
+        work: array of the arm and its body, see `robot_arrays`.
+        postures: (m, dof) [rad or m].
+        pairs: (n, 2) capsules.
+    """
     distances = np.empty((len(postures), len(pairs)))
-    _measure(robot_arrays((arm,), (body,), pack(())), postures, pairs.astype(np.float64), distances)
-    return Survey(postures, pairs, distances)
+    _measure(work, postures, pairs.astype(np.float64), distances)
+    return distances
 
 
-def possible_contacts(arm: Arm, body: Body, truth: MeshDistances) -> Body:
-    """Return a body with the pairs of its capsules that can hit each other.
+def rest_on_each_other(survey: Survey, indices: np.ndarray, truth: MeshDistances, names: tuple[str, str]) -> bool:
+    """Return whether two parts are near each other in nearly all postures: by their hulls, and by their meshes.
+
+    Args:
+        survey: of the body.
+        indices: of the pairs of their capsules.
+        truth: distances of the meshes.
+        names: of the parts.
+    """
+    if (survey.distances[:, indices] < NEAR).any(axis=1).mean() < MOSTLY:
+        return False
+    return bool(np.mean([truth.between(names, q) < NEAR for q in survey.postures[:RESTING]]) >= MOSTLY)
+
+
+def possible_contacts(
+    arm: Arm, body: Body, pieces: Sequence[Piece], truth: MeshDistances
+) -> tuple[Body, tuple[str, ...]]:
+    """Return a body with the pairs of its capsules that can hit each other, and what is doubtful about them.
 
     Neighboring links are left out: the joint between them keeps them apart. Parts that pass close by each other in
     ordinary postures get a margin of their own, which those postures keep.
@@ -129,20 +162,23 @@ def possible_contacts(arm: Arm, body: Body, truth: MeshDistances) -> Body:
     Args:
         arm: the arm.
         body: its capsules and hulls.
+        pieces: what these cover.
         truth: distances of the meshes, which decide where hulls touch.
     """
     survey = survey_of(arm, body)
     least = survey.distances.min(axis=0)
     rng, work = np.random.default_rng(1), robot_arrays((arm,), (body,), pack(()))
     kept: list[tuple[int, int]] = []
+    resting: list[tuple[str, str]] = []
     margins: dict[tuple[int, int], float] = {}
-    for names, indices in survey.by_parts(body).items():
-        if (survey.distances[:, indices] < NEAR).any(axis=1).mean() >= MOSTLY:
+    for names, indices in survey.by_parts([piece.label for piece in owners_of(body, pieces)]).items():
+        if rest_on_each_other(survey, indices, truth, names):
+            resting.append(names)
             continue
         for k in indices:
             least[k] = _least(arm, survey, work, k, rng)
         touch = least[indices].min() <= TOUCH
-        if touch and truth.knows(names):
+        if touch:
             near = survey.distances[:, indices].min(axis=1)
             touch = _least_truth(arm, truth, names, survey.postures[np.argsort(near)[:STARTS]], rng) <= TOUCH
         if touch:
@@ -152,7 +188,21 @@ def possible_contacts(arm: Arm, body: Body, truth: MeshDistances) -> Body:
             usual = SHARE * float(np.median(survey.distances[:, indices].min(axis=1)))
             if usual < CLOSE:
                 margins |= dict.fromkeys(pairs, max(usual, 0.0))
-    return replace(body, pairs=tuple(sorted(kept)), margins=margins)
+    return replace(body, pairs=tuple(sorted(kept)), margins=margins), _swept_through(resting)
+
+
+def _swept_through(resting: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    """Return a line for each part that sweeps through others in nearly all postures, so that it is not checked."""
+    through: dict[str, set[str]] = defaultdict(set)
+    for names in resting:
+        for mine, other in (names, names[::-1]):
+            if mine.endswith(SWEPT):
+                through[mine.removesuffix(SWEPT)].add(other.removesuffix(SWEPT))
+    return tuple(
+        f"{mine}: joints that are not the arm's sweep what hangs on it through {', '.join(sorted(others))} in nearly "
+        "all postures, so that these are not checked against it; hold the joints with `locked`"
+        for mine, others in through.items()
+    )
 
 
 def _least(arm: Arm, survey: Survey, work: np.ndarray, k: int, rng: np.random.Generator) -> float:

@@ -118,6 +118,13 @@ def fitted_capsules(points: np.ndarray, count: int) -> Cover:
     return [_tightest(piece) for piece in pieces]
 
 
+def rough_capsule(points: np.ndarray) -> Cover:
+    """Cover the convex hull of points (n, 3) [m] with one capsule that is found at once, not the smallest."""
+    _, parameters, frames = _starts(points, np.eye(3))
+    a, b, radius = _about(parameters[0], points @ frames[0].T)
+    return [(a @ frames[0], b @ frames[0], radius + SAFETY)]
+
+
 def _grid(points: np.ndarray, along: int, rows: int, columns: int) -> list[np.ndarray]:
     """Cut a hull into equal rows and columns of bars along an axis."""
     pieces = [points]

@@ -7,13 +7,16 @@ the paper: the paper moves a point.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from ..errors import UnfitShape
+from ..jit import inner, kernel
 from .convex_distance import PER_ROW, convex_distance
 from .hulls import box_axes
 from .shapes import MAX_VERTICES, SHAPE_KIND, hull_corners
+from .triangle_surface import nearest_on_triangles
 
 FRACTIONS = np.linspace(0.05, 0.95, 16)
 """Positions of the planes that are tried, as fractions of the solid's extent."""
@@ -21,45 +24,93 @@ WORTH = 5e-4
 """Distance [m] by which hulls must recede, on average, for a cut to be worth a further piece."""
 FEW = 64
 """Number of corners up to which a hull keeps all of them."""
-_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+MANY = 1200
+"""Number of triangles from which on a surface is thinned to choose a plane."""
+DEEPEST, TURNS = 3, 6
+"""Number of deepest points that planes are laid through, and of such planes per point."""
+FLAT = 1e-4
+"""Share of the largest extent below which the smallest one is none."""
 
 
 def best_cut(triangles: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
     """Cut a solid by the plane that makes the hulls of its parts recede most from some points.
 
+    Planes lie across the axes of the solid's box, and along the straight lines from the deepest points to the surface
+    below them, where they cut at the bottom of a hollow.
+
     Args:
         triangles: (n, 3, 3) of its surface, without regard to their order [m].
-        points: (k, 3) on its hull, off its surface [m].
+        points: (k, 3) on or in its hull, off its surface [m].
 
     Returns:
         The triangles of both sides; empty if no plane is worth a further piece.
     """
     if not len(triangles):
         return []
+    thin, best, most = thinned(triangles), None, WORTH
+    for plane in (*_across(thin), *_along(thin, points)):
+        gain = _gain(_both_sides(thin, plane), points)
+        if gain > most:
+            most, best = gain, plane
+    if best is None:
+        return []
+    sides = _both_sides(triangles, best)
+    try:
+        for side in sides:
+            hull_corners(side.reshape(-1, 3))
+    except UnfitShape:  # a sliver
+        return []
+    return sides if len(thin) == len(triangles) or _gain(sides, points) > 0.0 else []
+
+
+def _both_sides(triangles: np.ndarray, plane: tuple[np.ndarray, float]) -> list[np.ndarray]:
+    """Return the parts of triangles below and above a plane, given by its normal (3,) and height [m]."""
+    return [cut_off(triangles, sign * plane[0], sign * plane[1]) for sign in (1.0, -1.0)]
+
+
+def thinned(triangles: np.ndarray) -> np.ndarray:
+    """Return triangles (k, 3, 3) that stand for a surface of many (n, 3, 3): its long ones, and some of the others."""
+    if len(triangles) <= MANY:
+        return triangles
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    is_long = longest >= np.partition(longest, -MANY // 2)[-MANY // 2]
+    others = triangles[~is_long]
+    return np.concatenate([triangles[is_long], others[:: -(-len(others) // (MANY // 2))]])
+
+
+def _gain(sides: list[np.ndarray], points: np.ndarray) -> float:
+    """Mean distance [m] by which the hulls of two sides recede from points (k, 3) in their common hull."""
+    return float(np.minimum(*(_beyond(side, points) for side in sides)).mean())
+
+
+def _across(triangles: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """Yield normals (3,) and heights [m] of planes across the axes of a solid's box."""
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
-    best, most = [], WORTH
     for axis in box_axes(corners[hull_corners(corners)]):
         heights = corners @ axis
         for fraction in FRACTIONS:
-            cut = heights.min() + fraction * np.ptp(heights)
-            sides = [cut_off(triangles, sign * axis, sign * cut) for sign in (1.0, -1.0)]
-            gain = float(np.minimum(*(_beyond(side, points) for side in sides)).mean())
-            if gain > most:
-                most, best = gain, sides
-    return best
+            yield axis, float(heights.min() + fraction * np.ptp(heights))
+
+
+def _along(triangles: np.ndarray, points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """Yield normals (3,) and heights [m] of planes through the deepest points and the nearest points of the surface."""
+    near = [nearest_on_triangles(point, triangles) for point in points]
+    gaps = np.array([np.linalg.norm(point - foot) for point, foot in zip(points, near, strict=True)])
+    for k in np.argsort(-gaps, kind="stable")[:DEEPEST]:
+        if gaps[k] > WORTH:
+            across = np.linalg.svd(((points[k] - near[k]) / gaps[k])[None])[2][1:]
+            for angle in np.pi * np.arange(TURNS) / TURNS:
+                normal = math.cos(angle) * across[0] + math.sin(angle) * across[1]
+                yield normal, float(normal @ near[k])
 
 
 def _beyond(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Distances (k,) [m], or less, of points from the triangles' hull; 0 inside, negative if it has no volume."""
-    corners = triangles.reshape(-1, 3)
-    try:
-        corners = corners[hull_corners(corners)]
-    except UnfitShape:
+    """Distances (k,) [m] of points from the triangles' hull; 0 inside, negative if it has no volume."""
+    if not len(triangles):
         return np.full(len(points), -1.0)
-    from scipy.spatial import ConvexHull
-
-    planes = ConvexHull(corners).equations
-    return np.maximum((points @ planes[:, :3].T + planes[:, 3]).max(axis=1), 0.0)
+    corners = triangles.reshape(-1, 3)
+    extents = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
+    return np.full(len(points), -1.0) if extents[2] < FLAT * extents[0] else _to_hull(points, corners)
 
 
 def cut_off(triangles: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
@@ -93,65 +144,98 @@ def cut_off(triangles: np.ndarray, normal: np.ndarray, height: float) -> np.ndar
     return np.concatenate(parts)
 
 
-def to_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the distances (n,) [m] of points from a surface.
-
-    Args:
-        points: (n, 3) [m].
-        triangles: (m, 3, 3) of the surface [m].
-    """
-    edges = [_to_segments(points[:, None], triangles[:, k], triangles[:, (k + 1) % 3]) for k in range(3)]
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    above = np.broadcast_to(lengths > 0.0, edges[0].shape).copy()
-    for k in range(3):
-        along = triangles[:, (k + 1) % 3] - triangles[:, k]
-        above &= np.einsum("nmd,md->nm", points[:, None] - triangles[:, k], np.cross(normals, along)) >= 0.0
-    height = np.abs(np.einsum("nmd,md->nm", points[:, None] - triangles[:, 0], normals)) / np.maximum(lengths, 1e-300)
-    return np.where(above, height, np.minimum.reduce(edges)).min(axis=1)
-
-
-def _to_segments(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Distances (n, m) [m] of points (n, 1, 3) from segments (m, 3)."""
-    along = b - a
-    share = np.einsum("nmd,md->nm", points - a, along) / np.maximum((along * along).sum(axis=1), 1e-300)
-    return np.linalg.norm(points - a - np.clip(share, 0.0, 1.0)[:, :, None] * along, axis=2)
-
-
 def rounded_hull(points: np.ndarray, rounding: float) -> tuple[np.ndarray, float]:
     """Return few corners, and a radius, such that all points lie within the radius of the corners' hull.
 
     Args:
-        points: (n, 3) [m].
+        points: (n, 3) [m]; quickest if they are the corners of their hull.
         rounding: largest radius [m], unless even `MAX_VERTICES` corners need a larger one.
 
     Returns:
         Corners (k, 3) [m] and the radius [m], 0 if they are all corners of the points' hull.
     """
-    try:
-        points = points[hull_corners(points)]
-    except UnfitShape:
-        points = np.unique(points, axis=0)
     if len(points) <= FEW:
         return points, 0.0
-    chosen = sorted({int((points @ axis).argmax()) for axis in np.vstack([np.eye(3), -np.eye(3)])})
+    first = np.array(sorted({int((points @ axis).argmax()) for axis in np.vstack([np.eye(3), -np.eye(3)])}))
+    corners = np.zeros((-(-MAX_VERTICES // PER_ROW), 3 * PER_ROW))
+    chosen, work = np.empty(MAX_VERTICES, dtype=np.int64), np.zeros((2, len(points)), dtype=np.int64)
+    bounds = np.full(len(points), math.inf)
+    count, gap = _grow(np.ascontiguousarray(points), first, rounding, corners, chosen, bounds, work)
+    return points[chosen[:count]], 0.0 if count == len(points) else gap + 1e-6
+
+
+@kernel
+def _grow(points, first, rounding, g, chosen, bounds, work):
+    """Add to the first of points (n, 3) always the one farthest from the hull, until all are within the rounding.
+
+    Distances only shrink as the hull grows: known ones are bounds, and only the largest, on top of a heap, is asked
+    for again.
+
+    Returns:
+        The number of points chosen, and the largest distance [m] of any from their hull.
+    """
+    count, heap, asked = len(first), work[0], work[1]
+    for k in range(count):
+        _put(g, k, points[first[k]])
+        chosen[k] = first[k]
+    for k in range(len(points)):
+        heap[k] = k
     while True:
-        corners = points[chosen]
-        gaps = _to_hull(points, corners)
-        if len(chosen) == len(points):
-            return corners, 0.0
-        if gaps.max() <= rounding or len(chosen) == MAX_VERTICES:
-            return corners, float(gaps.max()) + 1e-6
-        chosen.append(int(gaps.argmax()))
+        farthest = heap[0]
+        if asked[farthest] < count:
+            asked[farthest] = count
+            bounds[farthest] = _gap(g, count, points[farthest])
+            _sink(heap, bounds)
+        elif bounds[farthest] <= rounding or count == min(len(chosen), len(points)):
+            return count, bounds[farthest]
+        else:
+            _put(g, count, points[farthest])
+            chosen[count] = farthest
+            count += 1
+
+
+@inner
+def _sink(heap, keys):
+    """Restore a heap of indices, the largest key first, after the key of the first became smaller."""
+    top, k = heap[0], 0
+    while 2 * k + 1 < len(heap):
+        child = 2 * k + 1
+        if child + 1 < len(heap) and keys[heap[child + 1]] > keys[heap[child]]:
+            child += 1
+        if keys[heap[child]] <= keys[top]:
+            break
+        heap[k] = heap[child]
+        k = child
+    heap[k] = top
+
+
+@inner
+def _put(g, k, point):
+    """Write a point (3,) as corner k of a hull."""
+    for axis in range(3):
+        g[k // PER_ROW, 3 * (k % PER_ROW) + axis] = point[axis]
+
+
+@inner
+def _gap(g, count, point):
+    """Distance of a point (3,) from the hull of corners, at most 1e-6 too small."""
+    zero, identity = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    at = (point[0], point[1], point[2])
+    found = convex_distance(g, 0, count, identity, zero, SHAPE_KIND.sphere, zero, 0, 0, identity, at, math.inf)
+    return found[0]
 
 
 def _to_hull(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Distances (n,) [m] of points from the hull of corners, at most 1e-6 too small."""
-    parts = [corners[first : first + PER_ROW].ravel() for first in range(0, len(corners), PER_ROW)]
-    g, zero = np.array([np.pad(part, (0, 3 * PER_ROW - part.size)) for part in parts]), (0.0, 0.0, 0.0)
-    count, ball = len(corners), SHAPE_KIND.sphere
-    found = [
-        convex_distance(g, 0, count, _IDENTITY, zero, ball, zero, 0, 0, _IDENTITY, tuple(point), math.inf)[0]
-        for point in points.tolist()
-    ]
-    return np.array(found)
+    g = np.zeros((-(-len(corners) // PER_ROW), 3 * PER_ROW))
+    g.reshape(-1)[: corners.size] = corners.ravel()
+    out = np.empty(len(points))
+    _write_distances(g, len(corners), np.ascontiguousarray(points), out)
+    return out
+
+
+@kernel
+def _write_distances(g, count, points, out):
+    """Write the distances (n,) of points (n, 3) from the hull of the corners in `g`."""
+    for k in range(len(points)):
+        out[k] = _gap(g, count, points[k])

@@ -12,11 +12,12 @@ from helpers.strategies import for_all, st
 
 from onedemo.bench.mbm import command
 from onedemo.bench.mbm.command import Track, chosen, prepared, run_mbm
-from onedemo.bench.mbm.mesh_judge import MeshJudge, densely, pairs_of_links
 from onedemo.bench.mbm.problems import Problem, read_problems
 from onedemo.bench.mbm.robot import RobotFiles, pose_numbers, robot_files, widened
 from onedemo.bench.mbm.solvers import OURS, Answer
 from onedemo.bench.mbm.table import is_unsound, page, row_of, summaries
+from onedemo.bench.mbm.track_judge import judge_of, pairs_of_links
+from onedemo.bench.robot.mesh_judge import MeshJudge, densely
 from onedemo.configs.errors import BadConfig
 from onedemo.planner.errors import BadModel, UnknownName
 from onedemo.planner.geometry.pose import Pose
@@ -122,7 +123,7 @@ def test_an_unsound_motion_ends_with_another_exit_code(track, tmp_path, monkeypa
 
 @pytest.fixture(scope="module")
 def judge(small) -> MeshJudge:
-    return MeshJudge(small[0])
+    return judge_of(small[0])
 
 
 @for_all(st.floats(-2, 2), st.floats(-2, 2), st.floats(-1, 1), st.floats(-1, 1), max_examples=60)
@@ -173,7 +174,7 @@ def test_the_judge_places_joints_that_turn_without_end(files, tmp_path):
     endless = RobotFiles(tmp_path / "endless.urdf", None, "tip", Pose.identity())
     text = files.urdf.read_text().replace('name="j_two" type="revolute"', 'name="j_two" type="continuous"')
     endless.urdf.write_text(text)
-    judge = MeshJudge(prepared(endless, PROBLEMS[:1])[0])
+    judge = judge_of(prepared(endless, PROBLEMS[:1])[0])
     for turn in (0.0, 1.0, -2.5):
         at = 0.3 + 0.2 * math.cos(turn), 0.2 * math.sin(turn)
         contact = judge.first_contact(np.array([[0.0, turn, 0.0]]), [ball(*at, radius=0.01)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 
 import numpy as np
@@ -17,9 +18,18 @@ from onedemo.planner import Arm, Body, Pose, SafetySettings, body_from_urdf
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.collision.hull_distance import CLOSE
 from onedemo.planner.collision.robot_arrays import HEADER, PAIR, ROW, robot_arrays
+from onedemo.planner.errors import ModelWarning
+from onedemo.planner.fitting.link_pieces import convex_link_pieces
+from onedemo.planner.fitting.mesh_distances import MeshDistances
+from onedemo.planner.fitting.robot_model import world_from_parts
+from onedemo.planner.fitting.robot_parts import PartsRequest
 from onedemo.planner.fitting.self_contacts import survey_of
-from onedemo.planner.geometry.convex_pieces import best_cut, cut_off, rounded_hull, to_triangles
+from onedemo.planner.fitting.urdf_parts import parts_from_urdf
+from onedemo.planner.geometry.capsule_cover import rough_capsule
+from onedemo.planner.geometry.convex_pieces import best_cut, cut_off, rounded_hull
 from onedemo.planner.geometry.shapes import MAX_VERTICES, pack
+from onedemo.planner.geometry.triangle_surface import is_inside, nearest_on_triangles, shells_of, to_triangles
+from onedemo.planner.robot.joint_frames import joint_frames
 
 LESS = 0.003
 """Distance [m] by which the arm's own parts may seem closer than they are."""
@@ -175,6 +185,97 @@ def test_a_cut_takes_a_hull_back_from_a_hollow():
     assert best_cut(triangles, np.array([[0.2, 0.2, 0.0]])) == []
 
 
+def elbow(thick: float = 0.04, long: float = 0.3) -> np.ndarray:
+    """Triangles of two boxes that make a right angle, turned so that no side is along an axis of its box."""
+    corners = np.array([[x, y, z] for x in (0.0, long) for y in (0.0, thick) for z in (0.0, thick)])
+    one = corners[ConvexHull(corners).simplices]
+    turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    return np.concatenate([one, one @ turn.T + [0.0, 0.0, thick]])
+
+
+def test_a_cut_at_the_bottom_of_a_hollow_frees_it():
+    triangles = elbow()
+    hollow = np.array([[0.1, 0.1, 0.02], [0.14, 0.08, 0.02]])
+    sides = best_cut(triangles, hollow)
+    planes = [ConvexHull(side.reshape(-1, 3)).equations for side in sides]
+    beyond = np.min([(hollow @ p[:, :3].T + p[:, 3]).max(axis=1) for p in planes], axis=0)
+    assert len(sides) == 2 and beyond.min() > 0.03
+
+
+@for_all(st.integers(0, 10**6), max_examples=40)
+def test_the_nearest_point_of_a_surface_is_as_near_as_no_other_of_its_triangles(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(20, 3))
+    triangles = points[ConvexHull(points).simplices]
+    point = 3.0 * rng.normal(size=3)
+    foot = nearest_on_triangles(point, triangles)
+    gap, least = np.linalg.norm(point - foot), to_triangles(point[None], triangles)[0]
+    # on an edge it is not exact: a corner stands for it
+    assert to_triangles(foot[None], triangles)[0] < 1e-9 and gap >= least - 1e-9
+    corners = np.linalg.norm(points - point, axis=1).min()
+    assert gap <= corners + 1e-12
+
+
+@for_all(st.integers(0, 10**6), max_examples=60)
+def test_inside_is_where_all_facets_are_behind(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(12, 3))
+    hull = ConvexHull(points)
+    triangles = points[hull.simplices]
+    for point in rng.normal(size=(20, 3)):
+        heights = hull.equations[:, :3] @ point + hull.equations[:, 3]
+        if abs(heights.max()) > 1e-6:
+            assert is_inside(point, triangles) == (heights.max() < 0.0)
+
+
+def test_shells_of_a_surface_are_what_shares_no_corner():
+    """A hollow box, one that overlaps it, and one that stands apart."""
+    box = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    box = box[ConvexHull(box).simplices]
+    solids = [box, 0.5 * box, box + np.array([0.7, 0.0, 0.0]), box + np.array([5.0, 0.0, 0.0])]
+    surface = np.random.default_rng(0).permutation(np.concatenate(solids))
+    shells = shells_of(surface)
+    assert sorted(len(shell) for shell in shells) == [12] * 4
+    assert {tuple(shell.mean(axis=(0, 1)).round(9)) for shell in shells} == {(0, 0, 0), (0.7, 0, 0), (5, 0, 0)}
+    for point, inside in (
+        ([0.0] * 3, True),
+        ([0.8, 0.0, 0.0], True),
+        ([5.0, 0.5, 0.0], True),
+        ([3.0, 0.0, 0.0], False),
+    ):
+        assert any(is_inside(np.array(point), shell) for shell in shells) == inside
+    assert not is_inside(np.array([0.8, 0.0, 0.0]), surface)  # twice inside, which a ray cannot tell from outside
+
+
+def test_a_part_inside_another_touches_it(tmp_path):
+    """A knob in the middle of a shell, and beside it; no surface crosses another."""
+    shell = f"""<robot name="nest"><link name="base">{BOX.format(z=0, size="0.3 0.3 0.3")}</link><link name="rod"/>
+<link name="knob">{BOX.format(z=0, size="0.02 0.02 0.02")}</link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="out" type="prismatic"><parent link="rod"/><child link="knob"/><axis xyz="1 0 0"/>
+<limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    path = tmp_path / "nest.urdf"
+    path.write_text(shell)
+    arm = Arm.from_urdf(path, tcp_frame="knob")
+    frames = [Pose.identity(), *joint_frames(arm, np.zeros(2))]
+    robot = parts_from_urdf(path, arm, None, PartsRequest({}, False)).robot
+    pieces = convex_link_pieces(robot, world_from_parts(robot.parts), frames, 1.02)
+    truth = MeshDistances(arm, pieces)
+    assert truth.between(("link0", "link2"), np.array([0.0, 0.0])) <= 0.0
+    assert truth.between(("link2", "link0"), np.array([0.0, 0.05])) <= 0.0
+    assert truth.between(("link0", "link2"), np.array([0.5, 0.145])) <= 0.0
+    assert truth.between(("link0", "link2"), np.array([0.0, 0.5])) == pytest.approx(0.34)
+
+
+def test_a_capsule_found_at_once_contains_the_points():
+    for seed in range(20):
+        points = np.random.default_rng(seed).normal(size=(40, 3)) * [1.0, 0.3, 0.1]
+        ((a, b, radius),) = rough_capsule(points)
+        share = np.clip((points - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0.0, 1.0)
+        assert np.linalg.norm(points - a - share[:, None] * (b - a), axis=1).max() <= radius
+
+
 @for_all(st.integers(0, 10**6), max_examples=40)
 def test_both_sides_of_a_cut_are_the_whole(seed):
     rng = np.random.default_rng(seed)
@@ -229,3 +330,18 @@ def test_a_contact_at_the_far_end_of_a_rail_is_found(post, tmp_path):
     path = written(tmp_path, *parts)
     body = body_from_urdf(path, Arm.from_urdf(path, tcp_frame="arm"))
     assert {(body.names[i], body.names[j]) for i, j in body.pairs} == {("link0", "link2")}
+
+
+def test_what_always_sweeps_through_another_part_is_said(tmp_path):
+    """A second arm on the first joint, free to turn all around, and held."""
+    parts = [link(name, '<box size="0.06 0.06 0.06"/>') for name in ("base", "one", "two", "three")]
+    places = (("base", "one", "0 0 0.1"), ("one", "two", "0 0 0.2"), ("two", "three", "0 0 0.3"))
+    parts += [joint(f"to_{b}", a, b, axis="0 1 0", xyz=place) for a, b, place in places]
+    parts += [link("other", '<box size="1.6 0.05 1.6"/>'), joint("free", "one", "other", "continuous", xyz="0 0.5 0")]
+    path = written(tmp_path, *parts)
+    arm = Arm.from_urdf(path, tcp_frame="three")
+    with pytest.warns(ModelWarning, match="link1: joints that are not the arm's sweep what hangs on it through"):
+        body_from_urdf(path, arm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ModelWarning)
+        body_from_urdf(path, arm, locked={"free": 0.0})
