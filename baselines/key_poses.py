@@ -36,7 +36,8 @@ def filled(keys: PosePath, join: Join) -> PosePath:
 def sparse(shown: Demonstration, count: int, join: Join | None = None) -> Demonstration:
     """Return a demonstration with every segment reduced to key poses; samples between segments stay.
 
-    Joints and gripper are those at the same share of the segment's path length; time is spread evenly.
+    Joints and gripper are those at the same share of the segment's path length; time is spread evenly. Of objects, only
+    where segments end relative to them remains.
 
     Args:
         shown: the complete demonstration.
@@ -61,6 +62,9 @@ def sparse(shown: Demonstration, count: int, join: Join | None = None) -> Demons
         joint_positions=rows[:, 9 : 9 + joints] if joints else None,
         gripper=rows[:, 9 + joints] if shown.gripper is not None else None,
         segments=tuple(segments),
+        object_paths={},
+        other_joints={},
+        commanded=None,
     )
 
 

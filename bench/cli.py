@@ -14,6 +14,7 @@ from .interruption import INTERRUPTED
 from .mbm.options import mbm
 from .robot import command as robot_commands
 from .survey.options import survey
+from .usage import usage_line
 
 BAD_INPUT = 2
 USAGE: Any = typer.BadParameter.__base__
@@ -278,21 +279,6 @@ def version() -> None:
     console().print(installed("onedemo"))
 
 
-def usage_line(error: Any) -> str:
-    """Return the mistake in the command line and the valid options in one line; "" if help was printed instead."""
-    text = " ".join(error.format_message().split()).rstrip(".")
-    context = getattr(error, "ctx", None)
-    if not text or context is None:
-        return text
-    names = [name for each in context.command.get_params(context) for name in each.opts]
-    options = ", ".join(name for name in names if name.startswith("-"))
-    commands = getattr(context.command, "commands", None)
-    if commands is not None:
-        return f"{text}; {context.command_path} knows: {', '.join(commands)}, {options}"
-    pieces = " ".join(context.command.collect_usage_pieces(context))
-    return f"{text}; usage: {context.command_path} {pieces}; options: {options}"
-
-
 def main() -> None:
     """Run the command line; errors of the project and of the command line become one line and exit code 2."""
     from ..planner.errors import OneDemoError
@@ -300,7 +286,7 @@ def main() -> None:
     try:
         sys.exit(app(prog_name="onedemo", standalone_mode=False) or 0)
     except USAGE as error:
-        reason, code = usage_line(error), BAD_INPUT
+        reason, code = usage_line(error, sys.argv[1:]), BAD_INPUT
     except typer.Abort:
         reason, code = "stopped", INTERRUPTED
     except OneDemoError as error:

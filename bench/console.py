@@ -31,6 +31,16 @@ def console(*, stderr: bool = False, quiet: bool = False) -> Console:
     return Console(stderr=stderr, quiet=quiet, highlight=False, markup=False, soft_wrap=True)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: "1 scenario", "2 scenarios".
+
+    Args:
+        count: the number.
+        noun: the noun in the singular; its plural ends in s.
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def labeled(label: str, style: str, text: str) -> Text:
     """Return a text with a colored label in front.
 

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ..configs.shipped_files import demonstration_path
 from ..planner.errors import UnknownName
-from .console import check_writable, console, labeled, writing
+from .console import check_writable, console, counted, labeled, writing
 
-if TYPE_CHECKING:
-    from ..planner import Demonstration, Segment
-
-IMPORTED = ("", "pour")
-"""Tasks for which a pose recording can become a demonstration; "" for no task."""
 app = typer.Typer(
     help="Inspect a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="markdown"
 )
@@ -33,94 +28,141 @@ def check(
     Example: onedemo demo check stack
     """
     from ..planner import read_demonstration
-    from ..planner.imitation.demonstration import warnings_of
-    from ..planner.imitation.demonstration_files import UNITS
+    from ..planner.imitation.demonstration_warnings import warnings_of
+    from .recordings.summary import facts, segment_lines
 
     path = demonstration_path(file)
     demo = read_demonstration(path)
     out = console()
+    lines = facts(path, demo)
     out.print(labeled(demo.name, "bold", f"{demo.source} {demo.robot}, task {demo.task or '-'}"))
-    out.print(f"  file      {path}")
-    out.print(f"  length    {demo.duration:.2f} s, {len(demo.path)} samples, {demo.path.lengths()[-1]:.2f} m (screw)")
-    out.print(f"  tool      {demo.tcp_frame}, units {UNITS}")
-    out.print(f"  joints    {'recorded' if demo.joint_positions is not None else 'not recorded'}")
-    out.print(f"  licence   {demo.licence}")
+    for word, text in lines:
+        out.print(f"  {word:9s} {text}")
     if demo.segments:
         out.print("segments, each with the screw from its first to its last pose in the world:")
     for segment in demo.segments:
-        what, screw = _segment_lines(demo, segment)
         out.print(f"  {segment.name}", style="bold")
-        out.print(f"    {what}\n    {screw}")
+        for line in segment_lines(demo, segment):
+            out.print(f"    {line}")
     warnings = warnings_of(demo)
     for warning in warnings:
         out.print(labeled("warning", "yellow", warning))
-    out.print(labeled("ok", "green", f"with {len(warnings)} warnings" if warnings else ""))
+    out.print(labeled("ok", "green", f"with {counted(len(warnings), 'warning')}" if warnings else ""))
+
+
+Texts = list[str] | None
+TABLES = "Tables of poses"
+MOTIONS = "Motions and objects"
 
 
 @app.command("import")
 def import_(
-    raw: Annotated[Path, typer.Argument(help="The recording: .npz of a robosuite teleoperation, or .npy/.csv poses.")],
+    raw: Annotated[
+        Path, typer.Argument(help="The recording: .csv, .txt or .npy poses, a teleoperation (.npz), or .hdf5.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The demonstration to write (.npz).")],
     name: Annotated[str, typer.Option(help="Name of the demonstration; default: the output file's name.")] = "",
+    task: Annotated[str, typer.Option(help="Task that was shown; the motions of a shipped one get its names.")] = "",
     robot: Annotated[str, typer.Option(help="Robot of the recording.")] = "Panda",
+    source: Annotated[str, typer.Option(help="teleoperated, kinesthetic or scripted.")] = "",
     licence: Annotated[str, typer.Option(help="Licence of the data.")] = "unknown",
-    source: Annotated[str, typer.Option(help="Poses only: teleoperated, kinesthetic or scripted.")] = "kinesthetic",
-    units: Annotated[str, typer.Option(help="Poses only: m, cm or mm.")] = "m",
-    quaternion: Annotated[str, typer.Option(help="Poses only: order of the columns, wxyz or xyzw.")] = "wxyz",
-    rate: Annotated[float, typer.Option(help="Poses only: sampling rate [Hz].")] = 0.0,
-    task: Annotated[str, typer.Option(help="Poses only: pour, if a glass is held from start to end.")] = "",
+    demo: Annotated[str, typer.Option(help="HDF5 only: the episode; default: the first one.")] = "",
+    units: Annotated[str, typer.Option(help="Of positions: m, cm or mm.", rich_help_panel=TABLES)] = "",
+    quaternion: Annotated[
+        str, typer.Option(help="Order of its columns, if nothing names them: wxyz, xyzw.", rich_help_panel=TABLES)
+    ] = "",
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second, without time stamps.", rich_help_panel=TABLES)
+    ] = None,
+    time_unit: Annotated[str, typer.Option(help="Of time stamps: s, ms, us, ns.", rich_help_panel=TABLES)] = "",
+    angles: Annotated[str, typer.Option(help="Of joints: rad or deg.", rich_help_panel=TABLES)] = "",
+    columns: Annotated[
+        str, typer.Option(help="Names of the columns: time,x,y,z,qw,qx,qy,qz,gripper", rich_help_panel=TABLES)
+    ] = "",
+    ignore: Annotated[
+        Texts, typer.Option(help="Column or key to leave out, like 'vel_*'; repeatable.", rich_help_panel=TABLES)
+    ] = None,
+    hand: Annotated[str, typer.Option(help="Whose pose is the hand's, of several.", rich_help_panel=TABLES)] = "",
+    gripper_closed: Annotated[
+        float | None, typer.Option(help="Value of the closed gripper.", rich_help_panel=TABLES)
+    ] = None,
+    tool: Annotated[
+        str, typer.Option(help="The tcp in the recorded frame: x,y,z or x,y,z,qw,qx,qy,qz [m].", rich_help_panel=TABLES)
+    ] = "",
+    cut: Annotated[
+        str, typer.Option(help="Where motions end: auto, gripper, rests or none.", rich_help_panel=MOTIONS)
+    ] = "auto",
+    segment: Annotated[
+        Texts,
+        typer.Option(
+            help="A motion, in order: NAME, NAME=0s:3.5s or NAME=0:169 (samples), then perhaps "
+            ",reference=OBJECT,held=OBJECT,gripper=close; repeatable.",
+            rich_help_panel=MOTIONS,
+        ),
+    ] = None,
+    size: Annotated[
+        Texts, typer.Option(help="Size of an object: NAME=x,y,z [m]; repeatable.", rich_help_panel=MOTIONS)
+    ] = None,
+    place: Annotated[
+        Texts,
+        typer.Option(
+            help="Where a thing stood: NAME=x,y,z or NAME=x,y,z,qw,qx,qy,qz [m]; repeatable.", rich_help_panel=MOTIONS
+        ),
+    ] = None,
 ) -> None:
     """Make a demonstration from a recording.
 
-    A robosuite teleoperation (.npz with t, q, actions, obj_cubeA_jnt0, obj_cubeB_jnt0) is converted by the robot's
-    forward kinematics and segmented where the gripper moves. Pose tables (.npy or .csv: x y z and a quaternion) are
-    segmented where the hand rests.
+    Says what it understood of the file, and leaves nothing out without a word. Motions end where the gripper acts, or,
+    if it does not, where the hand rests. The page docs/demonstrations.md goes from a recording to a run.
 
-    Examples (the first one makes the shipped demonstration, up to rounding):
-    - onedemo demo import panda_teleop_stack.npz -o stack.npz --licence "MIT, see LICENSE-robosuite.txt"
+    Examples:
+    - onedemo demo import poses.csv -o mine.npz --task stack
 
-    - onedemo demo import poses.csv --output mine.npz --units cm --quaternion xyzw --rate 100
+    - onedemo demo import poses.npy -o mine.npz --units cm --quaternion xyzw --rate 100
 
-    - onedemo demo import panda_pouring.npy -o pour_real.npz --units cm --rate 100 --task pour
+    - onedemo demo import low_dim.hdf5 -o mine.npz --demo demo_3 --task stack
     """
     from ..planner import save_demonstration
-    from ..planner.imitation.import_recordings import from_pose_table, stack_from_teleoperation
+    from ..planner.recordings.cuts import parsed_segment
+    from ..planner.recordings.pose_table import TableRequest
+    from .recordings.importing import ImportRequest, imported
+    from .recordings.option_values import places_of, sizes_of, tool_of
 
     check_writable("--output", output)
-    if task not in IMPORTED:
-        raise UnknownName("task of a pose recording", task, IMPORTED)
-    title = name or output.stem
-    if raw.suffix == ".npz":
-        from ..envs.scene.robots import robot_named
-        from ..envs.scene.scene import robot_arm
-
-        demo = stack_from_teleoperation(raw, robot_arm(robot_named(robot)), name=title, licence=licence)
-    else:
-        demo = from_pose_table(
-            raw,
-            name=title,
-            robot=robot,
-            rate=rate,
-            units=units,
-            quaternion=quaternion,
-            source=source,
-            licence=licence,
-        )
-        if task == "pour":
-            demo = _with_glasses(demo)
+    table = TableRequest(
+        units=units,
+        quaternion=quaternion,
+        rate=rate,
+        time_unit=time_unit,
+        angles=angles,
+        columns=tuple(word.strip() for word in columns.split(",")) if columns else (),
+        ignored=tuple(ignore or ()),
+        hand=hand,
+        closed=gripper_closed,
+        tool=tool_of(tool),
+    )
+    request = ImportRequest(
+        name=name or output.stem,
+        robot=robot,
+        task=task,
+        licence=licence,
+        source=source,
+        table=table,
+        episode=demo,
+        segments=tuple(parsed_segment(text) for text in segment or ()),
+        cut=cut,
+        sizes=sizes_of(size or ()),
+        places=places_of(place or ()),
+    )
+    demonstration, notes = imported(raw, request)
     with writing("--output", output):
-        save_demonstration(demo, output)
-    console().print(f"wrote {output}: {len(demo.path)} samples, {len(demo.segments)} segments")
-
-
-def _with_glasses(demo: Demonstration) -> Demonstration:
-    """Return a recording of pouring with the glasses that were not recorded, and print where they stand."""
-    from ..baselines.recording.import_pour import pour_from_poses
-
-    placed = pour_from_poses(demo)
-    for glass, top in zip(("source", "target"), placed.stands, strict=True):
-        console().print(f"the {glass} is taken to stand at {' '.join(f'{value:.3f}' for value in top)} m")
-    return placed.demonstration
+        save_demonstration(demonstration, output)
+    out = console()
+    for note in notes:
+        out.print(labeled("note", "cyan", note))
+    motions = ", ".join(each.name for each in demonstration.segments) or "none"
+    out.print(f"wrote {output}: {counted(len(demonstration.path), 'sample')}, motions: {motions}")
+    out.print(f"look at it: onedemo demo check {output}")
 
 
 @app.command()
@@ -152,27 +194,5 @@ def record(
     env.close()
     with writing("--output", output):
         save_demonstration(demo, output)
-    console().print(f"wrote {output}: {demo.duration:.1f} s, {len(demo.path)} samples, {len(demo.segments)} segments")
-
-
-def _segment_lines(demo: Demonstration, segment: Segment) -> tuple[str, str]:
-    """Return two lines: what a segment does, and the screw motion from its first to its last pose."""
-    import numpy as np
-
-    from ..planner.geometry.dualquat import screw_parameters
-
-    first, last = demo.path[segment.start], demo.path[segment.stop]
-    screw = screw_parameters((last @ first.inverse()).dq)
-    x, y, z = screw.axis
-    axis = f"({x:+.2f} {y:+.2f} {z:+.2f})"
-    carries = f"carries {segment.held}, " if segment.held else ""
-    then = {"close": ", then the gripper closes", "open": ", then the gripper opens"}.get(segment.gripper, "")
-    what = (
-        f"samples {segment.start} to {segment.stop}, {carries}ends relative to {segment.reference or 'the world'}{then}"
-    )
-    if np.isfinite(screw.pitch):
-        return what, (
-            f"screw: {np.degrees(screw.angle):.1f} deg about {axis}, {screw.travel:+.3f} m along it, "
-            f"pitch {screw.pitch:+.3f} m/rad"
-        )
-    return what, f"screw: {screw.travel:.3f} m along {axis}, no turn"
+    content = f"{counted(len(demo.path), 'sample')}, {counted(len(demo.segments), 'segment')}"
+    console().print(f"wrote {output}: {demo.duration:.1f} s, {content}")

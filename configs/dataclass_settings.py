@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from ..planner.errors import OneDemoError
-from .errors import BadConfig
+from ..planner.errors import BadOption, OneDemoError
+from .errors import BadConfig, unknown_key
 
 Settings = TypeVar("Settings")
 
@@ -29,13 +29,18 @@ def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) 
         BadConfig: an unknown key, a field given by both of its names, or a value that the field refuses.
     """
     values = _with_new_names(kind, values, source, "")
-    _refuse_unknown(kind, values, source, "")
+    _refuse_unknown(kind, kind, values, source, "")
     try:
         return _adapter(kind).validate_python(dict(values), strict=False)
     except ValidationError as error:
         first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise BadConfig(source, key, f"{first['msg']}, got {first['input']!r}") from None
+        cause, parts = first.get("ctx", {}).get("error"), [str(part) for part in first["loc"]]
+        if isinstance(cause, BadOption):  # of a dataclass, which names the field itself
+            raise BadConfig(source, ".".join([*parts, cause.option]), cause.reason) from None
+        reason = str(cause) if cause else f"{first['msg'][0].lower()}{first['msg'][1:]}, got {first['input']!r}"
+        raise BadConfig(source, ".".join(parts), reason) from None
+    except BadOption as error:
+        raise BadConfig(source, error.option, error.reason) from None
     except OneDemoError as error:
         raise BadConfig(source, "", str(error)) from None
 
@@ -69,7 +74,17 @@ def _with_new_names(kind: Any, values: Any, source: str, prefix: str) -> Any:
     return found
 
 
-def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:
+def _dotted(kind: Any, prefix: str = "") -> Iterator[str]:
+    """Yield the dotted names of all fields of a settings dataclass, those of nested ones included."""
+    types = get_type_hints(kind)
+    for field in fields(kind):
+        yield prefix + field.name
+        inner = _class_of(types[field.name])
+        if is_dataclass(inner):
+            yield from _dotted(inner, f"{prefix}{field.name}.")
+
+
+def _refuse_unknown(root: type, kind: Any, values: Any, source: str, prefix: str) -> None:
     """Refuse keys without a field: pydantic's validation of dataclasses ignores them."""
     kind = _class_of(kind)
     if not (is_dataclass(kind) and isinstance(values, Mapping)):
@@ -77,5 +92,5 @@ def _refuse_unknown(kind: Any, values: Any, source: str, prefix: str) -> None:
     allowed, types = [field.name for field in fields(kind)], get_type_hints(kind)
     for key, value in values.items():
         if key not in allowed:
-            raise BadConfig(source, f"{prefix}{key}", f"unknown key; allowed: {', '.join(allowed)}")
-        _refuse_unknown(types[key], value, source, f"{prefix}{key}.")
+            raise BadConfig(source, f"{prefix}{key}", unknown_key(str(key), allowed, _dotted(root)))
+        _refuse_unknown(root, types[key], value, source, f"{prefix}{key}.")

@@ -12,9 +12,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from .dotted_keys import MISSING, at, having, leaves, merged, without
-from .errors import BadConfig
-from .run_config import CELL_KEYS, LATER, RUN_KEYS, Default, RunConfig, RunSettings, digest_of, reason_of, unknown_key
-from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
+from .errors import BadConfig, unknown_key
+from .run_config import CELL_KEYS, LATER, RUN_KEYS, SWITCHES, Default, RunConfig, RunSettings, digest_of, reason_of
+from .shipped_files import shipped_demonstrations
+from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides, with_switches
 
 MAX_CELLS = 10_000
 ALLOWED = (*CELL_KEYS, *RUN_KEYS)
@@ -65,7 +66,9 @@ class Grid:
 
 
 def load_grid(path: str | Path, overrides: list[str] | None = None) -> Grid:
-    """Load and check a config file with `key=value` changes; a change of a swept key replaces its values.
+    """Load and check a config file with `key=value` changes.
+
+    A change of a swept key replaces its values; a sweep of a key replaces its value.
 
     Args:
         path: config file.
@@ -79,7 +82,11 @@ def load_grid(path: str | Path, overrides: list[str] | None = None) -> Grid:
     values = load_mapping(path)
     if isinstance(values.get("sweep"), dict):
         values["sweep"] = _unfolded(values["sweep"], path)
-    values = with_overrides(values, changes)
+    values = with_switches(with_overrides(values, changes), changed, SWITCHES)
+    for key in changed:
+        swept = key.removeprefix("sweep.")
+        if swept != key and swept not in changed:  # what is swept on the command line has no single value any more
+            values = without(values, swept)
     if isinstance(values.get("sweep"), dict):
         for key in changed:
             values["sweep"] = without(values["sweep"], key)
@@ -197,7 +204,19 @@ def _cell(values: dict[str, Any], chosen: dict[str, Any], path: str | Path, chan
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         cell = f" (in the cell {_combination(chosen)})" if chosen else ""
-        raise BadConfig(_blame(path, changed, key), key, reason_of(first, ALLOWED) + cell) from None
+        reason = reason_of(first, ALLOWED) + cell + _advice(key, first, values)
+        raise BadConfig(_blame(path, changed, key), key, reason) from None
+
+
+def _advice(key: str, error: Any, values: Mapping[str, Any]) -> str:
+    """Return what to write instead, where that can be said; else ""."""
+    if error["type"] == "missing" and key == "demonstration":
+        known = shipped_demonstrations()
+        name = values.get("task") if values.get("task") in known else known[0]
+        return f"; write demonstration: {name}, or a file; shipped are {', '.join(known)}"
+    if isinstance(error["input"], list) and key in CELL_KEYS and key not in FIXED:
+        return f"; to run each of several, write 'sweep.{key}=[...]', in a file sweep: {{{key}: [...]}}"
+    return ""
 
 
 def _matches(values: Mapping[str, Any], condition: Mapping[str, Any]) -> bool:

@@ -13,16 +13,18 @@ import numpy as np
 from ..planner import Box, Capsule, Cylinder, Mesh, Obstacle, Pose, PosePath, Shape, Sphere, read_demonstration
 from ..planner.errors import BadDemonstration, OneDemoError, UnfitShape, UnknownName
 from ..planner.geometry.shapes import LARGEST
-from ..planner.imitation.demonstration_files import unit_poses
+from ..planner.imitation.npz_arrays import unit_poses
 from ..planner.imitation.segmentation import resampled
 from .errors import BadConfig
 from .plan_scene_schema import HeldItem, Placed, Recorded, SceneConfig, ShapeFields, checked
 from .shipped_files import FOLDER, shipped_demonstration
-from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
+from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides, with_switches
 
 STEP = 0.005
 """Path length [m] between poses of a demonstration, so that pauses have no weight."""
 ANYWHERE = (0.0, 0.0, 0.0)
+SWITCHES = ("robot.visuals",)
+"""Keys that are true or false."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +109,8 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> PlanScene:
     """
     source = Path(path)
     changed = frozenset(text.partition("=")[0].split(".")[0] for text in overrides)
-    config = checked(with_overrides(load_mapping(source), list(overrides)))
+    values = with_overrides(load_mapping(source), list(overrides))
+    config = checked(with_switches(values, (text.partition("=")[0] for text in overrides), SWITCHES))
     if not isinstance(config, SceneConfig):
         key, reason = config
         raise BadConfig(_blamed(source, changed, key), key, reason)

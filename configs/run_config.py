@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
@@ -17,6 +16,8 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
+
+from .errors import unknown_key
 
 STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
@@ -148,6 +149,7 @@ class RunSettings(BaseModel):
 
 
 CELL_KEYS = tuple(RunConfig.model_fields)
+SWITCHES = tuple(key for key, field in RunConfig.model_fields.items() if field.annotation is bool)
 RUN_KEYS = tuple(RunSettings.model_fields)
 
 
@@ -176,18 +178,6 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def unknown_key(key: str, allowed: tuple[str, ...]) -> str:
-    """Return the message that refuses a key, with the key that may have been meant.
-
-    Args:
-        key: refused key.
-        allowed: allowed keys.
-    """
-    close = get_close_matches(key, allowed, n=1)
-    hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown key; {hint}allowed: {', '.join(allowed)}"
-
-
 def reason_of(error: Any, allowed: tuple[str, ...]) -> str:
     """Return the message for one of pydantic's errors, in the project's words.
 
@@ -199,4 +189,14 @@ def reason_of(error: Any, allowed: tuple[str, ...]) -> str:
         return unknown_key(str(error["loc"][-1]), allowed)
     if error["type"] == "missing":
         return "is missing"
-    return f"{error['msg'][0].lower()}{error['msg'][1:]}, got {error['input']!r}"
+    return f"{worded(error)}, got {error['input']!r}"
+
+
+def worded(error: Any) -> str:
+    """Return what one of pydantic's errors says, without pydantic's own words before it.
+
+    Args:
+        error: pydantic's error, as a mapping.
+    """
+    cause = error.get("ctx", {}).get("error")
+    return str(cause) if cause is not None else f"{error['msg'][0].lower()}{error['msg'][1:]}"

@@ -25,6 +25,11 @@ def shipped_demonstration(name: str) -> Path:
     return _shipped("demonstration", "demos", ".npz", name)
 
 
+def shipped_demonstrations() -> tuple[str, ...]:
+    """Return the names of all shipped demonstrations."""
+    return tuple(sorted(path.stem for path in (FOLDER / "demos").glob("*.npz")))
+
+
 def shipped_config(name: str) -> Path:
     """Return the file of a shipped benchmark config, like "stack".
 
@@ -61,6 +66,11 @@ def shipped_actor(name: str) -> Path:
     return _shipped("actor", "actors", ".json", name)
 
 
+def is_shipped(path: Path) -> bool:
+    """Return whether a file was installed with the package."""
+    return path.resolve().is_relative_to(FOLDER.resolve())
+
+
 def demonstration_path(name: str) -> Path:
     """Return the named file if the name looks like a file, else the shipped demonstration of this name.
 
@@ -68,5 +78,5 @@ def demonstration_path(name: str) -> Path:
         UnknownName: neither a file nor a shipped demonstration.
     """
     path = Path(name)
-    looks_like_a_file = path.suffix or path.exists() or len(path.parts) > 1
+    looks_like_a_file = path.suffix or path.is_file() or len(path.parts) > 1
     return path if looks_like_a_file else shipped_demonstration(name)

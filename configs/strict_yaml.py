@@ -6,6 +6,7 @@ at most 256 KiB.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,13 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, NodeEvent
 
+from .dotted_keys import at, having
 from .errors import BadConfig
 
 MAX_BYTES = 256 * 1024
 COMMAND_LINE = "command line"
+WORDS = {"1": True, "yes": True, "on": True, "true": True, "0": False, "no": False, "off": False, "false": False}
+"""Words for on and off on the command line."""
 
 
 def load_mapping(path: str | Path) -> dict[str, Any]:
@@ -64,6 +68,24 @@ def with_overrides(values: dict[str, Any], overrides: list[str]) -> dict[str, An
                 raise BadConfig(COMMAND_LINE, key, f"{part!r} holds a value, not a mapping")
         target[last] = parse(value, COMMAND_LINE)
     return result
+
+
+def with_switches(values: dict[str, Any], changed: Iterable[str], switches: Iterable[str]) -> dict[str, Any]:
+    """Return the mapping with what the command line says of switches as truth values.
+
+    There, 0 and 1, and yes, no, on, off, true and false in any case, are on or off; a file says true or false.
+
+    Args:
+        values: nested mapping.
+        changed: keys changed on the command line.
+        switches: dotted keys whose values are true or false.
+    """
+    for key in set(changed) & set(switches):
+        value = at(values, key)
+        word = str(value).lower() if isinstance(value, str | int) else ""
+        if word in WORDS:
+            values = having(values, key, WORDS[word])
+    return values
 
 
 def parse(text: str, source: str | Path) -> Any:

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from .errors import BadConfig
+from .errors import BadConfig, unknown_key
 from .learner_defaults import DEFAULTS
-from .run_config import STRICT, Name, digest_of, reason_of, unknown_key
+from .run_config import STRICT, Name, digest_of, reason_of
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
 
 ALGORITHMS = ("sac", "ppo", "sac-her", "sac-demo", "bc", "residual")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from ..planner.errors import BadOption, OneDemoError
 
+INSTALL = "install one of: apt install libegl1 libegl-mesa0 libgl1-mesa-dri, or apt install libosmesa6"
+
 
 class NoRoom(BadOption):
     """None of the drawn starts has enough clearance for the obstacles."""
@@ -22,11 +24,8 @@ class BadAction(OneDemoError, ValueError):
 
 
 class RenderingUnavailable(OneDemoError, RuntimeError):
-    """No OpenGL library can draw without a display."""
+    """No OpenGL library can draw without a display, or not in this process."""
 
-    def __init__(self, detail: str):
-        self.detail = detail
-        super().__init__(
-            f"no picture can be drawn ({detail}); install one of: apt install libegl1 libegl-mesa0 "
-            "libgl1-mesa-dri, or apt install libosmesa6"
-        )
+    def __init__(self, detail: str, remedy: str = INSTALL):
+        self.detail, self.remedy = detail, remedy
+        super().__init__(f"no picture can be drawn ({detail}); {remedy}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import gymnasium as gym
+from gymnasium.envs.registration import WrapperSpec
 
 
 class Id(NamedTuple):
@@ -39,8 +40,11 @@ IDS = {
 """Environments by id; the last four are single motions of the other tasks, meant for training."""
 
 
+WHOLE_COPIES = WrapperSpec("WholeCopies", "onedemo.envs.core.whole_copies:WholeCopies", {})
+
+
 def register_all() -> None:
     """Register the ids with Gymnasium; repeated calls do no harm."""
     for name, kind in IDS.items():
         if name not in gym.registry:
-            gym.register(name, entry_point=kind.entry_point, max_episode_steps=kind.steps)
+            gym.register(name, kind.entry_point, max_episode_steps=kind.steps, additional_wrappers=(WHOLE_COPIES,))

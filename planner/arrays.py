@@ -7,7 +7,10 @@ kind of array, whatever the caller has: others would be compiled for anew.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
 from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
@@ -120,6 +123,31 @@ def checked_kind(what: str, value: Any, kind: type[Item]) -> Item:
     return value
 
 
+def checked_settings(kind: type[Item], value: Item | None, what: str = "settings") -> Item:
+    """Return settings of the required class; the default ones for None.
+
+    Args:
+        kind: the class.
+        value: the settings.
+        what: their name, for messages.
+
+    Raises:
+        WrongType: the settings are of another class.
+    """
+    return kind() if value is None else checked_kind(what, value, kind)
+
+
+def checked_file(value: Any) -> Path:
+    """Return the path of a file.
+
+    Raises:
+        WrongType: the value is neither a text nor a path.
+    """
+    if not isinstance(value, str | PathLike):
+        raise WrongType("path", value, "the path of a file")
+    return Path(value)
+
+
 def checked_items(what: str, values: Iterable[Item], kind: type[Item]) -> tuple[Item, ...]:
     """Return items of the required class as a tuple, a tuple as it is.
 
@@ -162,3 +190,41 @@ def _fits(shape: tuple[int, ...], wanted: Sizes) -> bool:
 def _words(shape: Sizes) -> str:
     sizes = ["n" if size is None else str(size) for size in shape]
     return f"({', '.join(sizes)}{',' * (len(sizes) == 1)})"
+
+
+class FrozenArrays:
+    """Base of frozen dataclasses with read-only arrays: these stay so in pickles, and a copy is the value itself.
+
+    Writable ones could be changed behind the back of all who share them, and kernels would be compiled anew for them.
+    """
+
+    __slots__ = ()
+
+    def __copy__(self: Item) -> Item:
+        return self
+
+    def __deepcopy__(self: Item, memo: object) -> Item:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the values as they are: checking them anew could change their last bits."""
+        kind: Any = type(self)
+        return _unpickled, (kind, tuple(getattr(self, each.name) for each in fields(kind)))
+
+
+def _unpickled(kind: Any, values: tuple[Any, ...]) -> Any:
+    made = object.__new__(kind)
+    for each, value in zip(fields(kind), values, strict=True):
+        _freeze(value)
+        object.__setattr__(made, each.name, value)
+    return made
+
+
+def _freeze(value: Any) -> None:
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif isinstance(value, tuple):
+        for item in value:
+            _freeze(item)
+    elif isinstance(value, Mapping):
+        _freeze(tuple(value.values()))

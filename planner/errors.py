@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-MOST_DIGITS = 9
-"""Digits behind the point at which numbers that still look equal are written as equal."""
+MOST_DIGITS = 20
+"""Digits behind the point by which any two lengths or angles that differ look different."""
 
 
 def _allowed(names: Iterable[Any]) -> str:
@@ -39,8 +39,27 @@ def _described(value: Any) -> str:
     return f"{text}, a {kind}" if len(text) <= 40 and "\n" not in text else f"a {kind}"
 
 
-class OneDemoError(Exception):
+class _Raisable(type):
+    """Kind of errors with `type(error)(error)` the error itself: so Gymnasium raises those of worker processes."""
+
+    def __call__(cls, *args: Any, **named: Any) -> Any:
+        if len(args) == 1 and type(args[0]) is cls and not named:
+            return args[0]
+        return super().__call__(*args, **named)
+
+
+class OneDemoError(Exception, metaclass=_Raisable):
     """Root of all errors that a caller may want to catch; its text is one clear line."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes the same error in another process, whatever its constructor takes."""
+        return _unpickled, (type(self), self.args, self.__dict__)
+
+
+def _unpickled(kind: type[OneDemoError], args: tuple[Any, ...], data: dict[str, Any]) -> OneDemoError:
+    error = kind.__new__(kind, *args)
+    vars(error).update(data)
+    return error
 
 
 class NotUnit(OneDemoError, ValueError):
@@ -108,7 +127,7 @@ class UnknownName(OneDemoError, ValueError):
 
     def __init__(self, kind: str, name: object, known: Iterable[object]):
         self.kind, self.name, self.known = kind, name, tuple(known)
-        super().__init__(f"unknown {kind} {name!r}; known: {_allowed(self.known)}")
+        super().__init__(f"unknown {kind} {name!r}; known: {_allowed(self.known) or 'none'}")
 
 
 class BadOption(OneDemoError, ValueError):

@@ -17,12 +17,12 @@ LOWER = {
 }
 ORDER = {
     "planner": """
-        errors lazy_names ranges arrays jit columns strict_json geometry models robot collision fitting control
-        imitation log escape safety judge planning reactive
+        errors lazy_names deferred_imports ranges arrays jit columns strict_json geometry models robot collision fitting
+        control imitation recordings log escape safety judge planning reactive
     """,
-    "envs": "errors registration scene simulation core stack pour shelve",
+    "envs": "errors registration mujoco_library scene simulation core stack pour shelve",
     "configs": """
-        errors shipped_files demonstrations strict_yaml dotted_keys dataclass_settings run_config
+        errors shipped_files demonstrations dotted_keys strict_yaml dataclass_settings run_config
         learner_defaults grid learner_values train_config plan_scene_schema plan_scene
     """,
     "baselines": """
@@ -30,14 +30,21 @@ ORDER = {
         safe_actions screw_policy learning factory paths_only
     """,
     "bench": """
-        console atomic_files statistics provenance interruption task_table method_table demonstrations
-        drawing document robot metrics plan workers episodes report geometric run task_pages reproduce train
-        curves perf mbm survey cli
+        console usage atomic_files statistics provenance interruption task_table method_table recordings
+        demonstrations drawing document robot metrics plan workers episodes report geometric run task_pages
+        reproduce train curves perf mbm survey cli
     """,
     "face": "former_paths",
 }
 """Sub-packages, and files that lie in none, from the lowest up: each imports only from those before it."""
-ENVS_MAY_USE = {"planner.errors", "planner.jit", "planner.geometry", "planner.robot", "planner.fitting"}
+ENVS_MAY_USE = {
+    "planner.errors",
+    "planner.deferred_imports",
+    "planner.jit",
+    "planner.geometry",
+    "planner.robot",
+    "planner.fitting",
+}
 ENVS_MAY_USE |= {"planner.collision.proximity", "planner.control.inverse_kinematics", "planner.control.linear"}
 """Geometry and kinematics of the planner, no method."""
 SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
@@ -46,6 +53,7 @@ USERS = {
     "robosuite": {"envs/scene/robosuite_model.py", "bench/perf/command.py"},
     "pinocchio": {*READERS, "bench/perf/peers.py", "bench/robot/urdf_solids.py"},
     "numba": {"planner/jit.py"},
+    "mujoco": {"envs/mujoco_library.py"},
 }
 """Who alone imports a heavy library."""
 JUDGE_SHARES = {

@@ -13,7 +13,7 @@ from gymnasium.spaces import Box
 
 from ...envs import TaskDescription
 from ...planner.errors import BadOption
-from ...planner.imitation.demonstration_files import UNREADABLE
+from ...planner.imitation.npz_arrays import UNREADABLE
 from ..errors import BadActor
 from ..extras import needed
 from .actor import Actor, TrainingInfo, actor_for

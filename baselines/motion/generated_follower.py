@@ -64,7 +64,13 @@ class GeneratedFollower(ReactivePlanner):
         super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
 
     def go(
-        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
+        self,
+        path: PosePath,
+        *,
+        exact: bool = True,
+        next_motion: NextMotion | None = None,
+        detours: bool = True,
+        must_keep: bool = False,
     ) -> None:
         """See `ReactivePlanner`: the path, from about where the arm is, is the demonstrated path, its end the goal."""
         super().go(path, exact=exact, detours=detours)

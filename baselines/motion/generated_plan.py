@@ -14,9 +14,12 @@ import numpy as np
 from ...planner import Arm, Body, Plan, PlanRequest, PlanSettings, PosePath, guide_index, imitated_path
 from ...planner.control.arm_arrays import arm_arrays
 from ...planner.control.pursuit import ARRIVED, fresh_pursuit_state
+from ...planner.control.reachability import gap, why_not_reached
+from ...planner.errors import told_apart
 from ...planner.geometry.pose import METERS_PER_RADIAN
 from ...planner.planning.plan import MotionPlanner, pose_goal
-from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
+from ...planner.planning.planning_scene import PlanningScene, SceneTemplate
+from ...planner.planning.requests import checked_request
 from ...planner.safety.guarded_pursuit import guarded_roll_out
 from .motion_method import NO_PATH, PATH
 from .path_generators import PathGenerator
@@ -48,9 +51,9 @@ class GeneratedPlanner(MotionPlanner):
     def answer(self, request: PlanRequest) -> Plan:
         """Plan a motion; `next_motion` and `seed` mean nothing to a path generator."""
         begun = time.perf_counter()
-        q, distance = self.arm.checked(request.start), self.settings.safety.distance
-        request = request._replace(start=q.copy())
-        scene = PlanningScene(self._template, checked_obstacles(request.obstacles), distance, request.allowed)
+        request = checked_request(request, self.arm)
+        q, distance = np.asarray(request.start), self.settings.safety.distance
+        scene = PlanningScene(self._template, request.obstacles, distance, request.allowed)
         near = ToolObstacles.of(self.arm, self.body, request.obstacles, request.allowed)
         plan = self._made(request, scene, near, q, self.settings.motion.guide)
         if not plan.success and self.generator.guided:
@@ -68,9 +71,15 @@ class GeneratedPlanner(MotionPlanner):
         whole = path if leaving is None else leaving.joined(path)
         joints, arrived, margin, changed = self._rolled_out(scene, whole, q)
         distance, angle = path[-1].distance_to(goal)
-        reason = "" if arrived else "ik_or_limit"
-        if np.hypot(distance, METERS_PER_RADIAN * angle) > AT_GOAL:
-            reason = NO_PATH
+        reason, detail = "", ""
+        if (away := np.hypot(distance, METERS_PER_RADIAN * angle)) > AT_GOAL:
+            found, most = told_apart(1e3 * away, 1e3 * AT_GOAL, 1)
+            turn = f"a radian counted as {METERS_PER_RADIAN:g} m"
+            reason, detail = NO_PATH, f"the path ends {found} mm from the goal ({turn}), allowed are {most}"
+        elif not arrived:
+            reason = "ik_or_limit"
+            stop = f"the arm comes to a stop {gap(self.arm, goal, joints[-1])}"
+            detail = why_not_reached(self.arm, goal, q, search=False) or stop
         return Plan(
             joints=joints if not reason else q[None],
             dt=self.settings.motion.dt,
@@ -88,7 +97,7 @@ class GeneratedPlanner(MotionPlanner):
             arm=self.arm,
             body=self.body,
             settings=self.settings,
-            detail="" if reason != NO_PATH else f"the path ends {distance:.3f} m from the goal",
+            detail=detail,
             guide=guide,
             imitated_share=float(np.mean([scene.slack(row) >= 0.0 for row in joints[::EVERY]])) if not reason else 0.0,
         )

@@ -54,7 +54,13 @@ class Follower(Protocol):
         ...
 
     def go(
-        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
+        self,
+        path: PosePath,
+        *,
+        exact: bool = True,
+        next_motion: NextMotion | None = None,
+        detours: bool = True,
+        must_keep: bool = False,
     ) -> None:
         """See `ReactivePlanner.go`: follow a path to its end."""
         ...

@@ -23,6 +23,7 @@ from ...planner import (
 )
 from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
+from ...planner.planning.joint_space_motion import SearchFailure
 from ...planner.planning.joint_space_rrt import sample_ranges
 from ..extras import needed
 from .motion_method import NO_PATH, SCREW, Follower, MotionMethod, MotionPlanner, Relative
@@ -47,7 +48,13 @@ class RrtFollower(ReactivePlanner):
         super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
 
     def go(
-        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
+        self,
+        path: PosePath,
+        *,
+        exact: bool = True,
+        next_motion: NextMotion | None = None,
+        detours: bool = True,
+        must_keep: bool = False,
     ) -> None:
         """See `ReactivePlanner`: only the end of the path matters."""
         super().go(path, exact=exact)
@@ -65,10 +72,11 @@ class RrtFollower(ReactivePlanner):
             planner = RrtPlanner(self.arm, self.body, self.settings.plan, self._sampling)
             joints = np.asarray(q, dtype=np.float64)
             still = [each for each in self._obstacles if not each.velocity.any()]
-            found = planner.joints_or_reason(joints, self._goal, still, self._known_allowed(still))
+            found = planner.joints_or_failure(joints, self._goal, still, self._known_allowed(still))
             self._goal = None
-            if isinstance(found, str):
-                motion.fail("blocked" if found == NO_PATH else found, "no way through joint space was found")
+            if isinstance(found, SearchFailure):
+                reason = "blocked" if found.reason == NO_PATH else found.reason
+                motion.fail(reason, f"no way through joint space was found: {found.detail}")
             else:
                 motion.plan_now = False
                 motion.track(found, motion.path)

@@ -10,10 +10,14 @@ import numpy as np
 
 from ...planner import Arm, Body, Obstacle, Plan, PlanRequest, PlanSettings, Pose, PosePath, imitated_path
 from ...planner.control.inverse_kinematics import inverse_kinematics
+from ...planner.control.reachability import why_not_reached
 from ...planner.imitation.tsia import screw_path
+from ...planner.planning.joint_space_motion import SearchFailure
 from ...planner.planning.joint_space_rrt import sample_ranges
 from ...planner.planning.plan import MotionPlanner, pose_goal
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
+from ...planner.planning.requests import checked_request
+from ...planner.robot.joint_limits import within_limits
 from .motion_method import JOINTS, NO_PATH
 from .rrt_connect import RrtSettings, joint_path, timed
 
@@ -53,13 +57,13 @@ class RrtPlanner(MotionPlanner):
 
     def answer(self, request: PlanRequest) -> Plan:
         """Plan a motion; of the demonstrated path only the end matters."""
-        begun, q, goal = time.perf_counter(), self.arm.checked(request.start), pose_goal(request)
-        request = request._replace(start=q.copy())
-        joints, reason = q[None], ""
+        begun, request = time.perf_counter(), checked_request(request, self.arm)
+        q, goal = np.asarray(request.start), pose_goal(request)
+        joints, failure = q[None], SearchFailure("", "")
         for end in [goal] if request.leaving is None else [request.leaving[-1], goal]:
-            found = self.joints_or_reason(joints[-1], end, request.obstacles, request.allowed, request.seed)
-            if isinstance(found, str):
-                joints, reason = q[None], found
+            found = self.joints_or_failure(joints[-1], end, request.obstacles, request.allowed, request.seed)
+            if isinstance(found, SearchFailure):
+                joints, failure = q[None], found
                 break
             joints = np.vstack([joints, found[1:]])
         rows = [*joints[: -1 : max(1, len(joints) // 100)], joints[-1]]
@@ -67,13 +71,13 @@ class RrtPlanner(MotionPlanner):
         return Plan(
             joints=joints,
             dt=self.settings.motion.dt,
-            reason=reason,
+            reason=failure.reason,
             how=JOINTS,
             imitated_poses=imitated_path(request.demonstrated, goal).dqs,
             path_poses=path.dqs,
             tree_rows=np.empty((0, 8)),
             detours=0,
-            margin=min(self.arm.margin(row) for row in joints) if not reason else -np.inf,
+            margin=min(self.arm.margin(row) for row in joints) if not failure.reason else -np.inf,
             changed=0,
             tries=1,
             seconds=time.perf_counter() - begun,
@@ -81,17 +85,18 @@ class RrtPlanner(MotionPlanner):
             arm=self.arm,
             body=self.body,
             settings=self.settings,
-            imitated_share=0.0 if reason else 1.0,
+            detail=failure.detail,
+            imitated_share=0.0 if failure.reason else 1.0,
         )
 
-    def joints_or_reason(
+    def joints_or_failure(
         self,
         q: np.ndarray,
         goal: Pose,
         obstacles: Sequence[Obstacle],
         allowed: Sequence[tuple[str, str]],
         seed: int = 0,
-    ) -> np.ndarray | str:
+    ) -> np.ndarray | SearchFailure:
         """Plan joints from a configuration to a goal.
 
         Args:
@@ -102,20 +107,20 @@ class RrtPlanner(MotionPlanner):
             seed: seed of OMPL's random numbers.
 
         Returns:
-            Joints (t, dof) [rad] at every tick, or the reason of failure.
+            Joints (t, dof) [rad] at every tick, or why there are none.
         """
-        distance = self.settings.safety.distance
+        distance, q = self.settings.safety.distance, within_limits(self.arm, q)
         scene = PlanningScene(self._template, checked_obstacles(obstacles), distance, allowed)
         strict = PlanningScene(self._template, checked_obstacles(obstacles), distance)
         postures = self._postures(q, goal, scene, strict)
         if not postures:
-            return NO_POSTURE
+            return SearchFailure(NO_POSTURE, self._why_no_posture(q, goal, scene))
         # allowed contacts are used on the straight end only, if there is one
         free = strict if min(strict.slack(each) for each in (q, *(p.first for p in postures))) >= 0.0 else scene
         firsts = [each.first for each in postures]
         points = joint_path(free.seen, self.arm.lower, self.arm.upper, q, firsts, self.sampling, seed)
         if points is None:
-            return NO_PATH
+            return SearchFailure(NO_PATH, f"none leads to any of {len(firsts)} postures")
         met = min(postures, key=lambda each: float(np.abs(each.first - points[-1]).max()))
         step = self.sampling.speed * self.arm.velocity_limits * self.settings.motion.dt
         return timed(np.vstack([points, met.rest]), step)
@@ -136,6 +141,13 @@ class RrtPlanner(MotionPlanner):
         gentle = [each for each in ended if each is not None]
         nothing = np.empty((0, self.arm.dof))
         return (gentle or [Posture(each, nothing) for each in found])[: self.sampling.goals]
+
+    def _why_no_posture(self, q: np.ndarray, goal: Pose, scene: PlanningScene) -> str:
+        """Return why no posture of the goal was found: what the nearest touches, or why the goal is not reached."""
+        solution = inverse_kinematics(self.arm, goal, q)
+        if solution is not None and scene.slack(solution) < 0.0:
+            return f"in the posture nearest to the start {scene.tightest(solution)}"
+        return why_not_reached(self.arm, goal, q)
 
     def _ended(self, q: np.ndarray, goal: Pose, scene: PlanningScene, strict: PlanningScene) -> Posture | None:
         """Return a posture, with a straight end if in contact: along the fingers, or from above for a held object."""

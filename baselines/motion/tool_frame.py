@@ -91,11 +91,17 @@ class ToolFrameFollower:
         self._follower.hold(body)
 
     def go(
-        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
+        self,
+        path: PosePath,
+        *,
+        exact: bool = True,
+        next_motion: NextMotion | None = None,
+        detours: bool = True,
+        must_keep: bool = False,
     ) -> None:
         """See `Follower`."""
-        there = _next_motion(next_motion, self._tool)
-        self._follower.go(path.with_tool(self._tool), exact=exact, next_motion=there, detours=detours)
+        there, path = _next_motion(next_motion, self._tool), path.with_tool(self._tool)
+        self._follower.go(path, exact=exact, next_motion=there, detours=detours, must_keep=must_keep)
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """See `Follower`."""

@@ -12,6 +12,7 @@ import numpy as np
 from ...planner import Arm, Body, Command, NextMotion, Plan, Pose, PosePath, ReactiveSettings, Shape, final_path
 from ...planner.errors import PlanFailed
 from ...planner.reactive.command import DONE, ESCAPING, FAILED
+from ...planner.robot.joint_limits import near_limit
 from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
 from ..policy import LabeledPath, Observation
 from .goal_choice import ChosenMotion, MotionChoice, choose, departure_path
@@ -176,6 +177,7 @@ class ArmExecutor:
         exact: bool = True,
         next_motion: NextMotion | None = None,
         detours: bool = True,
+        must_keep: bool = False,
         plan: Plan | None = None,
     ) -> Actions:
         """Follow a path to its end, around obstacles.
@@ -185,6 +187,7 @@ class ArmExecutor:
             exact: False: finish as soon as the tool is within reach of the end.
             next_motion: the next motion: where there is a choice, the path ends in a posture that suits it.
             detours: False: along the path or not at all.
+            must_keep: new plans must keep some of the path, see `PlanRequest.must_keep`.
             plan: the plan the path comes from; if its `how` is PATH, the follower gets the plan itself.
 
         Raises:
@@ -194,7 +197,7 @@ class ArmExecutor:
         if plan is not None and plan.how == PATH:
             self._planner.follow(plan, exact=exact)
         else:
-            self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours)
+            self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours, must_keep=must_keep)
         led = plan if plan is not None and plan.how == ESCAPE else None
         if led:
             nominal = final_path(self.arm.fk(self.q), led.imitated, led.guide)
@@ -207,7 +210,8 @@ class ArmExecutor:
             if command.state == DONE:
                 return
             if command.state == FAILED:
-                raise PlanFailed(command.reason, command.detail or self._stall_detail())
+                stalled = f"no progress; {near_limit(self.arm, self.q) or 'no joint is near its limit'}"
+                raise PlanFailed(command.reason, command.detail or stalled)
             yield self._action(command.velocity)
 
     def leave(self, path: PosePath, distance: float) -> Actions:
@@ -276,9 +280,3 @@ class ArmExecutor:
         normalized = np.clip(speeds / self._full, -1.0, 1.0)
         self.q = self.q + self.settings.dt * normalized * self._full
         return np.append(normalized, self._gripper)
-
-    def _stall_detail(self) -> str:
-        margins = np.minimum(self.q - self.arm.lower, self.arm.upper - self.q)
-        joint = int(np.argmin(margins))
-        near = f"{self.arm.joint_names[joint]} is {margins[joint]:.3f} rad from its limit"
-        return f"no progress; {near}"

@@ -72,6 +72,10 @@ class BimanualPourProgram:
 
     SEGMENTS = ("approach", "carry", "return")
     """Segments required of a demonstration of this task."""
+    SIZED: tuple[str, ...] = ("source", "target")
+    """Objects whose sizes a demonstration must give."""
+    RELEASE = ""
+    """Segment after which the recorded gripper decides how far this one opens; "" for none."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: DualArmExecutor):
         self.task, self.settings, self.hands = task, settings, hands

@@ -43,7 +43,16 @@ CHANCES = 3
 """Number of attempts where the carry is blocked."""
 
 
-Contacts = tuple[tuple[str, str], ...]
+class Leg(NamedTuple):
+    """Demands of a leg of the program on its plans.
+
+    Attributes:
+        allowed: contacts that are wanted.
+        must_keep: a plan that keeps nothing of the demonstration fails: a full glass is not tilted in any other way.
+    """
+
+    allowed: tuple[tuple[str, str], ...] = ()
+    must_keep: bool = False
 
 
 class CarryCandidate(NamedTuple):
@@ -56,6 +65,7 @@ class CarryCandidate(NamedTuple):
         margin: smallest joint margin on the way [rad].
         rank: 2 as demonstrated, 1 with a detour or through joint space, 0 does not arrive.
         reason: "" or the reason of failure.
+        detail: the facts of the failure.
     """
 
     paths: tuple[PosePath, ...]
@@ -64,12 +74,14 @@ class CarryCandidate(NamedTuple):
     margin: float
     rank: int
     reason: str = ""
+    detail: str = ""
 
     def then(self, other: CarryCandidate) -> CarryCandidate:
         """Return this candidate followed by another."""
         margin, rank = min(self.margin, other.margin), min(self.rank, other.rank)
         paths, plans = (*self.paths, *other.paths), (*self.plans, *other.plans)
-        return CarryCandidate(paths, plans, other.q, margin, rank, self.reason or other.reason)
+        reason, detail = (self.reason, self.detail) if self.reason else (other.reason, other.detail)
+        return CarryCandidate(paths, plans, other.q, margin, rank, reason, detail)
 
     @property
     def order(self) -> tuple[int, bool, float]:
@@ -89,6 +101,10 @@ class PourProgram:
 
     SEGMENTS = ("carry",)
     """Segments required of a demonstration; "approach" too if the source is not in the hand from the start."""
+    SIZED: tuple[str, ...] = ("source", "target")
+    """Objects whose sizes a demonstration must give."""
+    RELEASE = ""
+    """Segment after which the recorded gripper decides how far this one opens; "" for none."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.settings, self.executor = task, settings, executor
@@ -99,10 +115,10 @@ class PourProgram:
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.shown.items()]
         self.source, self.target = (each.name for each in task.objects)
         self._plan = settings.reactive.plan
-        self._standing: Contacts = (("held", task.furniture[SOURCE].name),)
-        self._wanted: tuple[Contacts, Contacts] = (
-            (("fingers", self.source), ("hand", self.source)),
-            (("held", self.target),),
+        self._carrying, self._lifting = Leg(), Leg((("held", task.furniture[SOURCE].name),))
+        self._at_glass = (
+            Leg((("fingers", self.source), ("hand", self.source))),
+            Leg((("held", self.target),), must_keep=True),
         )
 
     def actions(self) -> Iterator[np.ndarray]:
@@ -115,7 +131,7 @@ class PourProgram:
         grasped, shape = executor.tcp_from(SOURCE), self.task.objects[SOURCE].shape
         executor.hold(SOURCE, shape, grasped)
         if self._stands():
-            executor.allow(self._standing)
+            executor.allow(self._lifting.allowed)
             yield from executor.leave(self._lift(executor.arm.fk(executor.q)), OFF)
         # the source slips a little during the lift: the goal is computed from its present pose in the hand
         held = executor.lifted()
@@ -134,7 +150,7 @@ class PourProgram:
         before, after, *_ = candidate.paths
         self.paths.append(LabeledPath("final", f"fetch {self.source}", before.joined(after)))
         yield from self.executor.follow(before, exact=False, plan=candidate.plans[0])
-        self.executor.allow(self._wanted[SOURCE])
+        self.executor.allow(self._at_glass[SOURCE].allowed)
         yield from self.executor.follow(after, plan=candidate.plans[1])
         yield from self.executor.wait(self.settings.settle)
         yield from self.executor.grip(CLOSE, self.settings.close)
@@ -157,8 +173,9 @@ class PourProgram:
             try:
                 yield from self.executor.follow(carry, exact=False, plan=candidate.plans[0])
                 # near the target, the source may come as close to the target as demonstrated
-                self.executor.allow(self._wanted[TARGET])
-                yield from self.executor.follow(tilt, plan=candidate.plans[1])
+                leg = self._at_glass[TARGET]
+                self.executor.allow(leg.allowed)
+                yield from self.executor.follow(tilt, plan=candidate.plans[1], must_keep=leg.must_keep)
                 return
             except PlanFailed:
                 failed.append(turn)
@@ -189,16 +206,16 @@ class PourProgram:
         far = np.flatnonzero(clearances > NEAR)
         return max(1, int(far[-1])) if len(far) else 1
 
-    def _planned(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, allowed: Contacts) -> CarryCandidate:
+    def _planned(self, planner: MotionPlanner, path: PosePath, q: np.ndarray, leg: Leg) -> CarryCandidate:
         """Plan a motion to the end of a path, around obstacles."""
-        contacts = (*self.task.touching, *allowed)
-        plan = planner.plan(path, q, path[-1], self._named_obstacles(planner.body), allowed=contacts)
+        contacts, around = (*self.task.touching, *leg.allowed), self._named_obstacles(planner.body)
+        plan = planner.plan(path, q, path[-1], around, allowed=contacts, must_keep=leg.must_keep)
         followed = path if plan.how == "joint search" or not plan.success else plan.path
         as_shown = plan.how == DIRECT or (plan.how in MADE and plan.imitated_share == 1.0)
         rank = 0 if not plan.success else 2 if as_shown else 1
         reason = "" if plan.success else "ik_or_limit" if plan.reason == "ik_or_limit" else "blocked"
         return CarryCandidate(
-            (followed,), (plan,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason
+            (followed,), (plan,), plan.joints[-1], plan.margin if plan.success else -np.inf, rank, reason, plan.why
         )
 
     def _chosen_fetch(self) -> CarryCandidate:
@@ -210,7 +227,7 @@ class PourProgram:
             goal = self.goals.grasp(executor.object_pose(SOURCE), turn)
             candidate = self._in_two(empty, imitated_path(self.shown["approach"], goal), executor.q, SOURCE)
             if candidate.rank:
-                candidate = candidate.then(self._planned(full, self._lift(goal), candidate.q, self._standing))
+                candidate = candidate.then(self._planned(full, self._lift(goal), candidate.q, self._lifting))
             if candidate.rank:
                 candidate = candidate.then(self._chosen_carry(candidate.q, held, [], thoroughly=False)[0])
             if best is None or (len(candidate.paths), candidate.order) > (len(best.paths), best.order):
@@ -219,7 +236,7 @@ class PourProgram:
                 break
         assert best is not None
         if len(best.paths) == 2 and not best.rank:
-            raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated")
+            raise PlanFailed(best.reason, f"no turn of {self.source} can be grasped as demonstrated: {best.detail}")
         return best
 
     def _chosen_carry(
@@ -257,7 +274,7 @@ class PourProgram:
         """Plan a path that ends near a glass in two parts; only the second may touch the glass."""
         split = self._near(glass, path, planner.body)
         before, after = path[: split + 1], path[split:]
-        candidate = self._planned(planner, before, q, ())
+        candidate = self._planned(planner, before, q, self._carrying)
         if candidate.rank == 0:
             return candidate._replace(paths=(before, after), plans=(None, None))
-        return candidate.then(self._planned(planner, after, candidate.q, self._wanted[glass]))
+        return candidate.then(self._planned(planner, after, candidate.q, self._at_glass[glass]))

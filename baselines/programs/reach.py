@@ -30,6 +30,10 @@ class ReachProgram:
 
     SEGMENTS = ("approach",)
     """Segments required of a demonstration of this task."""
+    SIZED: tuple[str, ...] = ()
+    """Objects whose sizes a demonstration must give."""
+    RELEASE = ""
+    """Segment after which the recorded gripper decides how far this one opens; "" for none."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.settings, self.executor = task, settings, executor

@@ -49,11 +49,15 @@ class ShelveProgram:
 
     SEGMENTS = ("approach", "reach", "lift", "carry", "insert", "retreat")
     """Segments required of a demonstration of this task."""
+    SIZED: tuple[str, ...] = ()
+    """Objects whose sizes a demonstration must give."""
+    RELEASE = "insert"
+    """Segment after which the recorded gripper decides how far this one opens; "" for none."""
 
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.shown, self.settings, self.executor = task, shown, settings, executor
         self._parts = {name: resampled(shown.segment_path(name), settings.resample) for name in self.SEGMENTS}
-        self._release = _gripper_after(shown, "insert", task)
+        self._release = _gripper_after(shown, self.RELEASE, task)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._parts.items()]
 
     def actions(self) -> Iterator[np.ndarray]:

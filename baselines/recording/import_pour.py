@@ -14,7 +14,7 @@ import numpy as np
 from ...envs.pour.geometry import GLASSES, SOURCE, TARGET, tcp_from_glass
 from ...envs.scene.scene_objects import extents
 from ...planner import Demonstration, Pose, PosePath, Segment
-from ...planner.errors import BadDemonstration
+from ...planner.errors import BadDemonstration, told_apart
 
 PANDA_BASE = (-0.56, 0.0, 0.912)
 """Position of the simulated Panda's base in the world [m]."""
@@ -57,7 +57,8 @@ def pour_from_poses(recorded: Demonstration) -> PlacedDemonstration:
     source = hand.with_tool(tcp_from_glass(GLASSES[SOURCE]))
     tilts = np.array([pose.tilt for pose in source])
     if not (tilts > POURS).any():
-        reason = f"the glass is tilted by {np.degrees(tilts.max()):.0f} deg at most; pouring begins at 92"
+        most, needed = told_apart(float(np.degrees(tilts.max())), float(np.degrees(POURS)), 0)
+        reason = f"the glass is tilted by {most} deg at most; pouring begins at {needed}"
         raise BadDemonstration(recorded.name, "path", reason)
     forward = hand[0].rotation[:, 2] * [1.0, 1.0, 0.0]
     forward /= np.linalg.norm(forward)

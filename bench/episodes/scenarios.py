@@ -11,6 +11,7 @@ from typing import Any
 from ...configs import BadConfig, RunConfig
 from ...planner.errors import OneDemoError
 from ..atomic_files import canonical, sha256_of, write_whole
+from ..console import counted
 
 FILE = "scenarios.json"
 VERSION = 1
@@ -111,7 +112,7 @@ class Suite:
         refused = sum(each.get("refused", 0) for each in self.scenarios)
         infeasible = sum("infeasible" in each for each in self.scenarios)
         count = len(self.scenarios)
-        parts = [f"{count} scenarios, suite {self.hash[:12]}"]
+        parts = [f"{counted(count, 'scenario')}, suite {self.hash[:12]}"]
         if refused:
             parts.append(f"{refused} of {count + refused} draws had no room for the obstacles and were drawn anew")
         if infeasible:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ...configs import BadConfig
 from ...planner.errors import UnknownName
 from ..atomic_files import canonical
-from ..console import console, labeled
+from ..console import console, counted, labeled
 from ..episodes.run_folder import LOG, alone
 from ..interruption import INTERRUPTED
 from ..workers.dispatcher import Dispatcher, Job, WorkerFailed
@@ -77,7 +77,7 @@ def run_geometric(
             suite = frozen_suite(output, order, dispatcher)
             say.print(suite_line(suite))
             rows = completed(output, suite, order, dispatcher, say)
-        say.print(f"{len(rows)} paths, {time.perf_counter() - begun:.0f} s")
+        say.print(f"{counted(len(rows), 'path')}, {time.perf_counter() - begun:.0f} s")
     except KeyboardInterrupt:
         say.print(labeled("stopped", "yellow", "finished paths are kept; the same command continues"))
         return INTERRUPTED
@@ -142,7 +142,7 @@ def frozen_suite(folder: Path, order: GeometricRequest, dispatcher: Dispatcher) 
         suite = GeometricSuite(order.seed, sorted(lines, key=lambda line: line["index"]))
         suite.write(folder)
     elif (suite.seed, len(suite.lines)) != (order.seed, order.count):
-        what = f"holds {len(suite.lines)} scenarios of seed {suite.seed}; choose another --output"
+        what = f"holds {counted(len(suite.lines), 'scenario')} of seed {suite.seed}; choose another --output"
         raise BadConfig(folder, "suite.jsonl", what)
     return suite
 
@@ -214,7 +214,7 @@ def completed(
     known, wanted = recorded(file, say), list(wanted_rows(suite, order))
     todo = [key for key in wanted if key not in known]
     if len(todo) < len(wanted):
-        say.print(f"{len(wanted) - len(todo)} of {len(wanted)} paths were made before")
+        say.print(f"{len(wanted) - len(todo)} of {counted(len(wanted), 'path')} made before")
     with file.open("ab") as out, Progress(console=say, transient=True) as progress:
         task = progress.add_task("paths", total=len(todo))
         for answer in answers(dispatcher, jobs_for(folder, todo)):

@@ -18,6 +18,7 @@ from ...planner import Box, Capsule, Obstacle, Pose, Shape, Sphere
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.errors import BadOption
 from ..atomic_files import canonical, sha256_of, write_whole
+from ..console import counted
 from .parts import KINDS, CarriedPart, part_named, robot
 
 FILE = "suite.jsonl"
@@ -244,5 +245,5 @@ def suite_line(suite: GeometricSuite) -> str:
     """Return the numbers of scenarios and infeasible draws in words."""
     draws = sum(each.draws for each in suite.scenarios)
     count = len(suite.scenarios)
-    refused = f"{draws - count} of {draws} draws were not feasible and were drawn anew"
-    return f"{count} scenarios, suite {suite.hash[:12]}; {refused}"
+    refused = f"{draws - count} of {counted(draws, 'draw')} not feasible and drawn anew"
+    return f"{counted(count, 'scenario')}, suite {suite.hash[:12]}; {refused}"

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary, proxy
 
 import fcl
-import mujoco
 import numpy as np
 
+from ...envs.mujoco_library import mujoco
 from ...envs.scene.scene import FIRST_OBJECT
 from ...envs.simulation.obstacle_distance import ROBOT
 from ...planner import Box, Capsule, Cylinder, Shape, Sphere

@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
+from ...envs.mujoco_library import mujoco
 from ...envs.simulation.moving_obstacles import KINDS, described
 from ...planner import Box, Capsule, Shape, Sphere
 

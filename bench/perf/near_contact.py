@@ -25,7 +25,7 @@ GAP, WIDE = 0.005, 0.02
 
 def _near_contact() -> Row:
     """Measure the smallest slack of the UR5e, and MuJoCo's contacts of the same hulls with the same balls."""
-    import mujoco
+    from ...envs.mujoco_library import mujoco
 
     arm, body, q = _robot()
     hulls = _hulls(arm, body, q)
@@ -33,7 +33,7 @@ def _near_contact() -> Row:
     g = robot_arrays((arm,), (body,), pack(balls), margin=0.0)
     place_capsules(g, q, ROW.placed)
     placed = ROW.placed  # looked up once: the row is of the kernel
-    model, data = _twin(mujoco, hulls, balls)
+    model, data = _twin(hulls, balls)
     ours, theirs = seconds_per_call(
         lambda: clearance.min_slack(g, placed, 0.0, 0.1), lambda: mujoco.mj_collision(model, data)
     )
@@ -77,8 +77,10 @@ def _balls(arm: Arm, body: Body, q: np.ndarray, hulls: list[np.ndarray]) -> tupl
     return tuple(found)
 
 
-def _twin(mujoco: Any, hulls: list[np.ndarray], balls: tuple[Obstacle, ...]) -> tuple[Any, Any]:
+def _twin(hulls: list[np.ndarray], balls: tuple[Obstacle, ...]) -> tuple[Any, Any]:
     """Return MuJoCo's model and data of one body of all hulls among the balls."""
+    from ...envs.mujoco_library import compiled_model, mujoco
+
     meshes = [
         f'<mesh name="m{k}" vertex="{" ".join(f"{v:.9g}" for v in corners.ravel())}"/>'
         for k, corners in enumerate(hulls)
@@ -88,7 +90,7 @@ def _twin(mujoco: Any, hulls: list[np.ndarray], balls: tuple[Obstacle, ...]) -> 
         f'<geom type="sphere" size="{RADIUS}" pos="{" ".join(f"{v:.9g}" for v in ball.pose.position)}"/>'
         for ball in balls
     ]
-    model = mujoco.MjModel.from_xml_string(
+    model = compiled_model(
         f"<mujoco><asset>{''.join(meshes)}</asset><worldbody>{''.join(spheres)}"
         f"<body><freejoint/>{''.join(geoms)}</body></worldbody></mujoco>"
     )

@@ -150,7 +150,7 @@ def _slope(name: str, sizes: np.ndarray, seconds: list[float]) -> Row:
 
 def _whole_arm(name: str) -> Row:
     """Measure eight link capsules against twenty obstacles, and MuJoCo's distance for each pair."""
-    import mujoco
+    from ...envs.mujoco_library import mujoco
 
     arm, body, q = _panda()
     rows = body.rows[[k for k, r in enumerate(body.rows) if r[BODY.frame] >= 0][:8]]
@@ -158,7 +158,7 @@ def _whole_arm(name: str) -> Row:
     obstacles = _spread(20, MIXED)
     g = robot_arrays((arm,), (eight,), pack(obstacles), settings=SafetySettings().packed(0.02))
     place_capsules(g, q, ROW.placed)
-    model, data = _mujoco_twin(mujoco, g[ROW.placed : ROW.placed + 8], rows[:, BODY.radius], obstacles)
+    model, data = _mujoco_twin(g[ROW.placed : ROW.placed + 8], rows[:, BODY.radius], obstacles)
 
     def theirs() -> float:
         return min(mujoco.mj_geomDistance(model, data, i, 8 + k, 10.0, None) for i in range(8) for k in range(20))
@@ -169,7 +169,9 @@ def _whole_arm(name: str) -> Row:
     return row(name, ours / peer, "ratio", 0.1, note)
 
 
-def _mujoco_twin(mujoco: Any, world: np.ndarray, radii: np.ndarray, obstacles: list[Obstacle]) -> tuple[Any, Any]:
+def _mujoco_twin(world: np.ndarray, radii: np.ndarray, obstacles: list[Obstacle]) -> tuple[Any, Any]:
+    from ...envs.mujoco_library import compiled_model, mujoco
+
     geoms = [
         f'<geom type="capsule" size="{r}" fromto="{" ".join(str(v) for v in ends[:6])}"/>'
         for ends, r in zip(world, radii, strict=True)
@@ -183,7 +185,7 @@ def _mujoco_twin(mujoco: Any, world: np.ndarray, radii: np.ndarray, obstacles: l
             geoms.append(f'<geom type="capsule" pos="{place}" size="{each.shape.radius} {each.shape.length / 2}"/>')
         elif isinstance(each.shape, Sphere):
             geoms.append(f'<geom type="sphere" pos="{place}" size="{each.shape.radius}"/>')
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{''.join(geoms)}</worldbody></mujoco>")
+    model = compiled_model(f"<mujoco><worldbody>{''.join(geoms)}</worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return model, data

@@ -51,7 +51,7 @@ def swaying(env: Any) -> np.ndarray:
 
 def _step(task: str, name: str) -> Row:
     """Measure a user's step against MuJoCo alone, in two scenes with the same motion and the same controls."""
-    import mujoco
+    from ...envs.mujoco_library import mujoco
 
     # joint velocities: twists depend on the arm's pose, so a second sway would have other controls
     env, bare = (started(task, control_mode="joint_velocity") for _ in range(2))

@@ -31,7 +31,7 @@ from ...planner.planning import refine
 from ...planner.planning.planning_scene import PlanningScene
 from ...planner.planning.refine import ACCELERATION, refused
 from ...planner.safety.robot_checks import contact_masks
-from ..console import console, labeled
+from ..console import console, counted, labeled
 from ..robot.load_robot import RobotRequest, kind_of, load_robot
 from ..robot.robot_summary import postures_of
 from .scene_plan import ScenePlan
@@ -214,7 +214,7 @@ def _lines(planned: ScenePlan, certificate: Certificate | None) -> Iterator[tupl
             yield (
                 "looked at ",
                 "",
-                f"{len(plan.tree.poses)} nodes in the last escape tree, {kept} of them kept",
+                f"{counted(len(plan.tree.poses), 'node')} in the last escape tree, {kept} of them kept",
             )
         return
     seconds = plan.dt * (len(plan.joints) - 1)
@@ -237,7 +237,7 @@ def _lines(planned: ScenePlan, certificate: Certificate | None) -> Iterator[tupl
 
 def _how(plan: Plan) -> str:
     ways = {"direct": "as demonstrated, no detour", "joint search": "by a search in joint space"}
-    found = ways.get(plan.how, f"{plan.detours} {'detour' if plan.detours == 1 else 'detours'} by escape trees")
+    found = ways.get(plan.how, f"{counted(plan.detours, 'detour')} by escape trees")
     return ", ".join((found, *plan.refined))
 
 
@@ -254,12 +254,21 @@ def _clearance(planned: ScenePlan, certificate: Certificate | None) -> str:
         return "nothing to touch"
     if certificate is not None:
         closest = min(certificate.clearances, key=certificate.clearances.__getitem__)
-        kept = f"{1e3 * planned.settings.safety.distance:.0f} mm must be kept"
-        return f"{1e3 * certificate.clearance:.1f} mm at the least ({closest}), between the ticks too; {kept}"
+        return f"{1e3 * certificate.clearance:.1f} mm at the least ({closest}), between the ticks too; {_kept(planned)}"
     scene = planned.scene
     work = PlanningScene.of(planned.arm, planned.body, scene.obstacles, planned.settings, scene.allowed)
     slack = min(work.slack(q) for q in planned.plan.joints)
     return f"{1e3 * slack:.1f} mm more than must be kept, at the ticks"
+
+
+def _kept(planned: ScenePlan) -> str:
+    """Return the distances that must be kept: the general one, and an obstacle's own."""
+    obstacles = planned.scene.obstacles
+    names = [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(obstacles)]
+    margins = {name: o.margin for name, o in zip(names, obstacles, strict=True) if o.margin is not None}
+    own = [f"{1e3 * margin:g} mm from {name}" for name, margin in margins.items()]
+    general = [f"{1e3 * planned.settings.safety.distance:g} mm"] if len(own) < len(obstacles) else []
+    return f"{', '.join([*general, *own])} must be kept"
 
 
 def _time(seconds: float) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ...configs import BadConfig
 from ..atomic_files import write_whole
+from ..console import counted
 from ..document.document import Block, Bullets, Code, Document, Heading, Link, Paragraph, Picture, Pictures, Table
 from ..document.html_page import html_of
 from ..document.markdown_page import markdown_of
@@ -89,7 +90,7 @@ def _document(run: Run, output: Path) -> Document:
     shown = {kind: with_caption(found, CAPTIONS[kind]) for kind, found in pictures.items()}
     names = list(dict.fromkeys(cell.name for cell in run.cells.values()))
     cells, episodes = len(groups), sum(len(group.records) for group in groups)
-    document = Document(f"{', '.join(names)}: {_counted(cells, 'cell')}, {_counted(episodes, 'episode')}")
+    document = Document(f"{', '.join(names)}: {counted(cells, 'cell')}, {counted(episodes, 'episode')}")
     document.blocks += [
         *_opening(run, groups),
         Heading(2, "Safe success"),
@@ -140,10 +141,6 @@ def _first_episode(shown: dict[str, Any], folder: Path, of: str, output: Path) -
     problems = {"figure": shown.get("figure_problem"), "video": shown.get("video_problem")}
     missing = [f"No {what}{of}: {problem}." for what, problem in problems.items() if problem]
     return [*blocks, Bullets(missing)] if missing else blocks
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 
 PATHS = "Blue: the demonstration where it was given. Magenta: the final paths. Dashed: the executed path."

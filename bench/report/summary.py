@@ -15,6 +15,8 @@ from ..task_table import TASKS
 from .groups import outcome_of
 
 SUMMARY = "summary.json"
+DETAILS, SEEDS = 3, 5
+"""Largest numbers of details per kind of failure, and of seeds per detail, on the terminal."""
 
 
 def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, Any]:
@@ -50,6 +52,22 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
         "clearance_mm_min": min(clearances, default=None),
         "refused": sum(record.refused for record in records),
         "failures": dict(Counter(outcome_of(record) for record in records if not record.success)),
+        "failure_details": _details(records),
+    }
+
+
+def _details(records: list[EpisodeRecord]) -> dict[str, list[str]]:
+    """Return the details of failures by reason, the most frequent first, each with a seed."""
+    found: dict[str, dict[str, list[int]]] = {}
+    for record in records:
+        if not record.success:
+            found.setdefault(outcome_of(record), {}).setdefault(record.detail, []).append(record.seed)
+    return {
+        reason: [
+            f"{detail or 'no detail'} (seed {', '.join(map(str, seeds[:SEEDS]))}{', …' * (len(seeds) > SEEDS)})"
+            for detail, seeds in sorted(details.items(), key=lambda each: -len(each[1]))
+        ]
+        for reason, details in found.items()
     }
 
 
@@ -74,8 +92,18 @@ def verdict(row: dict[str, Any]) -> list[str]:
         f"{row['safe_successes']} without any unwanted contact",
         f"{_said(row['seconds_median'])} s simulated per episode (median), {largest}",
         f"planner {times}; failures: {failures}",
+        *why_failed(row),
         *_beside_obstacles(row),
     ]
+
+
+def why_failed(row: dict[str, Any]) -> list[str]:
+    """Return a line for each kind of failure of a cell: its number, and why, with the seeds."""
+    lines = []
+    for reason, details in row["failure_details"].items():
+        more = f"; and {len(details) - DETAILS} more reasons, see the report" if len(details) > DETAILS else ""
+        lines.append(f"  {row['failures'][reason]} {reason}: {'; '.join(details[:DETAILS])}{more}")
+    return lines
 
 
 def _beside_obstacles(row: dict[str, Any]) -> list[str]:

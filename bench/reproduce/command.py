@@ -55,8 +55,12 @@ def reproduce(names: Iterable[str], output: Path, *, episodes: int | None = None
     except OSError as error:
         raise BadConfig(COMMAND_LINE, "--output", f"{output}: {error.strerror}") from None
     start, load = time.perf_counter(), os.getloadavg()[0]
+    left = [each for each in wanted if finished(each, output, episodes) is None]
+    work = {each.name: _work(each, episodes) for each in left}
     for number, each in enumerate(wanted, 1):
-        err.print(f"{number} of {len(wanted)}: {each.title} ({each.name})")
+        done = sum(work[before.name] for before in wanted[: number - 1] if before in left)
+        words = time_left(time.perf_counter() - start, done, sum(work.values()) - done)
+        err.print(f"{number} of {len(wanted)}: {each.title} ({each.name}){words}")
         if isinstance(each, Drawing):
             draw_trees(each, output)
         elif code := run_config(each.config, changes(each, episodes, video=video), output / RUNS):
@@ -68,6 +72,22 @@ def reproduce(names: Iterable[str], output: Path, *, episodes: int | None = None
     for page in pages:
         console().print(str(page))
     return 0
+
+
+def _work(each: Experiment | Drawing, episodes: int | None) -> int:
+    """Return a measure of an experiment's work: its episodes; drawings take about as long as one."""
+    return 1 if isinstance(each, Drawing) else each.episodes if episodes is None else episodes
+
+
+def time_left(seconds: float, done: int, left: int) -> str:
+    """Return how long the rest will take, as far as what is done shows; "" if nothing is done or left.
+
+    Args:
+        seconds: time [s] so far.
+        done: work done in it.
+        left: work left.
+    """
+    return f", about {max(1, round(seconds * left / done / 60.0))} min left" if done and left else ""
 
 
 def changes(experiment: Experiment, episodes: int | None, *, video: bool) -> list[str]:

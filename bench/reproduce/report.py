@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..atomic_files import write_whole
+from ..console import counted
 from ..document.document import Block, Code, Document, Entry, Heading, Link, Paragraph, Picture, Pictures, Table
 from ..document.html_page import html_of
 from ..document.markdown_page import markdown_of
@@ -134,11 +135,11 @@ def run_agrees(row: Row) -> str:
     done, count = row["successes"], row["episodes"]
     failures = ", ".join(f"{reason} {times}" for reason, times in row["failures"].items())
     if done == count:
-        said = f"Agrees: done from one demonstration in all {count} starts"
+        said = f"Agrees: done from one demonstration in {'its only start' if count == 1 else f'all {count} starts'}"
     elif done:
-        said = f"Agrees in {done} of {count} starts, the others failed ({failures})"
+        said = f"Agrees in {done} of {counted(count, 'start')}, the others failed ({failures})"
     else:
-        said = f"Does not agree: none of {count} starts succeeded ({failures})"
+        said = f"Does not agree: none of {counted(count, 'start')} succeeded ({failures})"
     if row["clearance_mm_min"] is None:
         return f"{said}."
     if row["touching"]:

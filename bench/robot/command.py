@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from ..console import COMMAND_LINE, check_writable, console, labeled, writing
+from ..console import COMMAND_LINE, check_writable, console, counted, labeled, writing
 
 if TYPE_CHECKING:
     from .load_robot import LoadedRobot, RobotRequest
@@ -118,7 +118,8 @@ def report_lines(loaded: LoadedRobot, request: RobotRequest) -> Iterator[tuple[s
     yield "reach     ", "", f"{reach_of(arm):.3f} m from the first joint to {loaded.tool}, found by a search"
     pairs = body_pairs(arm, body, SafetySettings().self_distance)
     parts = len(set(body.names))
-    yield "body      ", "", f"{len(body)} capsules in {parts} parts; {len(pairs)} pairs are checked against each other"
+    checked = f"{counted(len(pairs), 'pair')} checked for contact"
+    yield "body      ", "", f"{counted(len(body), 'capsule')} in {counted(parts, 'part')}; {checked}"
     closest = {(body.names[i], body.names[j]): margin for (i, j), margin in body.margins.items()}
     for (one, other), margin in closest.items():
         if margin < SafetySettings().self_distance:
@@ -129,14 +130,14 @@ def report_lines(loaded: LoadedRobot, request: RobotRequest) -> Iterator[tuple[s
     for piece in volumes_of(loaded):
         solid = "its geometry is swept" if np.isnan(piece.geometry) else f"its geometry {1e3 * piece.geometry:.3f} l"
         ratio = f", ratio {piece.volume / piece.geometry:.2f}" if piece.geometry > 0 else ""
-        count = f"{piece.capsules} capsule{'s' if piece.capsules > 1 else ' '}"
+        count = f"{counted(piece.capsules, 'capsule'):{len(str(piece.capsules)) + 9}}"
         yield "part      ", "", f"{piece.name:8}  {count}  {1e3 * piece.volume:7.3f} l, {solid}{ratio}"
     for line in report.unused:
         yield "not used  ", "", line
     for line in report.warnings:
         yield "warning   ", "yellow", line
     count = len(report.warnings)
-    yield "ok        ", "green", f"with {count} warning{'s' if count > 1 else ''}" if count else ""
+    yield "ok        ", "green", f"with {counted(count, 'warning')}" if count else ""
 
 
 def _without_speeds(request: RobotRequest) -> bool:

@@ -158,10 +158,10 @@ def _urdf(request: RobotRequest) -> tuple[Arm, ReadRobot, str]:
 
 
 def _mujoco(request: RobotRequest) -> tuple[Arm, ReadRobot, str]:
-    import mujoco
+    from ...envs.mujoco_library import compiled_model
 
     try:
-        model = mujoco.MjModel.from_xml_path(str(request.file))
+        model = compiled_model(request.file)
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise BadModel(request.file, "MJCF", f"cannot be compiled: {reason}") from None

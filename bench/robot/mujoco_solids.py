@@ -38,7 +38,7 @@ class MujocoSolids(TrueSolids):
         *,
         visuals: bool = False,
     ):
-        import mujoco
+        from ...envs.mujoco_library import mujoco
 
         self._mujoco, self._model, self._data = mujoco, model, mujoco.MjData(model)
         self._geoms = [

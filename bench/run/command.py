@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...configs import BadConfig, load_grid, shipped_config
-from ..console import console
+from ..console import console, counted
 from ..episodes.run_folder import LOG, alone, describe, merge, open_folder, parsed_shard, recorded
 from ..episodes.scenarios import read_suite
 from ..interruption import ended
@@ -92,7 +92,9 @@ def _completed(comparison: Comparison, err: Any) -> list[str]:
         records, _ = recorded(folder, grid.cells, suite)
         missing = sum(len(suite.feasible(cell)) for cell in grid.cells) - len(records)
         if missing:
-            return [f"part {shard.index} of {shard.count} is done; {missing} episodes of other parts are missing"]
+            return [
+                f"part {shard.index} of {shard.count} is done; missing of other parts: {counted(missing, 'episode')}"
+            ]
         with alone(folder, "pictures"):
             if len(grid.cells) == 1:
                 with err.status("drawing the first episode"):

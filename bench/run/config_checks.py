@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...baselines.own_policy import is_own
 from ...configs import BadConfig, Grid, RunConfig
+from ...configs.errors import unknown_key
 from ...planner.errors import BadDemonstration
+from ..recordings.summary import joints_in_words
 from ..task_table import TASKS
 
 if TYPE_CHECKING:
@@ -52,6 +55,13 @@ def known_names() -> dict[str, Iterable[str | None]]:
     return {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
 
 
+def level_words() -> str:
+    """Return all levels, each with what it is."""
+    from ...envs import LEVELS
+
+    return "; ".join(f"{name}: {level.words}" for name, level in LEVELS.items())
+
+
 def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterable[str | None]]) -> None:
     """Refuse an unknown name; dotted paths of users' own policies pass.
 
@@ -67,7 +77,8 @@ def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterab
     if key == "method" and isinstance(value, str) and is_own(value):
         return
     if key in known and value not in list(known[key]):
-        raise BadConfig(source, key, f"unknown {key} {value!r}; known: {', '.join(map(str, known[key]))}")
+        words = level_words() if key == "level" else ", ".join(map(str, known[key]))
+        raise BadConfig(source, key, f"unknown {key} {value!r}; known: {words}")
 
 
 def _check_arguments(cell: RunConfig, grid: Grid) -> None:
@@ -96,8 +107,7 @@ def check_env(cell: RunConfig, source: str | Path) -> None:
     known = [key for key in signature(creator).parameters if key not in OWN_KEYS]
     for key in cell.env:
         if key not in known:
-            reason = f"{name} has no such argument; allowed: {', '.join(known) or 'none'}"
-            raise BadConfig(source, f"env.{key}", reason)
+            raise BadConfig(source, f"env.{key}", f"{unknown_key(key, known)} (arguments of {name})")
 
 
 def _check_settings(cell: RunConfig, grid: Grid) -> None:
@@ -125,7 +135,7 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
     """
     from ...baselines.screw_policy import PROGRAMS
     from ...configs import load_demonstration
-    from ...configs.shipped_files import demonstration_path
+    from ...configs.shipped_files import demonstration_path, is_shipped
 
     file = demonstration_path(cell.demonstration)
     demonstration = load_demonstration(cell.demonstration)
@@ -138,4 +148,27 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
             there = ", ".join(names) or "none"
             reason = f"{name!r} is missing; {task!r} needs {', '.join(segments)}, there are: {there}"
             raise BadDemonstration(file, "segment_names", reason)
+    _check_content(file, demonstration, PROGRAMS[cell.task])
+    if not is_shipped(file):  # those are compared by a test
+        _check_joints(file, demonstration)
     return demonstration
+
+
+def _check_content(file: Path, demonstration: Demonstration, program: Any) -> None:
+    """Refuse a demonstration that lacks something else that the program of a task looks at."""
+    for name in program.SIZED:
+        if name not in demonstration.object_sizes:
+            there = ", ".join(demonstration.object_sizes) or "none"
+            reason = f"of {name!r} is missing; this task needs {', '.join(program.SIZED)}, there are: {there}"
+            raise BadDemonstration(file, "object_sizes", reason)
+    if program.RELEASE:
+        after = demonstration.segment(program.RELEASE).stop + 1
+        if demonstration.gripper is None or after >= len(demonstration.gripper):
+            reason = f"says nothing about how the hand opens after {program.RELEASE!r}, which this task needs"
+            raise BadDemonstration(file, "gripper", reason)
+
+
+@lru_cache(maxsize=32)
+def _check_joints(file: Path, demonstration: Demonstration) -> None:
+    """Refuse a demonstration whose joints contradict its poses; of each one this is looked at once."""
+    joints_in_words(file, demonstration)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..console import counted
 from .measured_robot import AMONG, FREE, KINDS, Row, contact_of
 
 INTRODUCTION = """# Any arm
@@ -93,7 +94,8 @@ def page(rows: Sequence[Row], robots: str) -> str:
     unsound = sum(len(each["unsound"]) + len(each["contacts"]) for row in done for each in row["plans"].values())
     plans = sum(each["solved"] for row in done for each in row["plans"].values())
     sums = (
-        f"{len(done)} robots, {len(failed)} failed, {len(skipped)} skipped; {plans} plans, {unsound} of them unsound."
+        f"{counted(len(done), 'robot')}, {len(failed)} failed, {len(skipped)} skipped; {counted(plans, 'plan')}, "
+        f"{unsound} of them unsound."
     )
     text = [INTRODUCTION.format(robots=robots), sums]
     text += [BODIES, _table(_body_cells(row) for row in done), _meanings(BODY_COLUMNS)]

@@ -83,9 +83,9 @@ def true_robot(robot: LoadedRobot, request: RobotRequest) -> TrueRobot:
     held, dof, body = robot.arm.report.held, robot.arm.dof, robot.body
     solids: Any
     if kind_of(request.file) == "mujoco":
-        import mujoco
+        from ...envs.mujoco_library import compiled_model
 
-        model = mujoco.MjModel.from_xml_path(str(request.file))
+        model = compiled_model(request.file)
         names = [place.piece for place in places_of(robot.parts.robot.parts, dof)]
         solids = MujocoSolids(model, robot.arm.joint_names, held, names, visuals=request.visuals)
     else:

@@ -11,6 +11,7 @@ import numpy as np
 from ...baselines import task_episode
 from ...baselines.extras import needed
 from ...configs import BadConfig, TrainConfig
+from ...configs.errors import unknown_key
 from ...configs.learner_defaults import DEFAULTS
 from ...configs.learner_values import misfit_of
 from ...envs.core.single_motion import HORIZON
@@ -38,7 +39,7 @@ def chosen(config: TrainConfig) -> dict[str, Any]:
     known = known_arguments(config.algorithm)
     for key in config.learner:
         if key not in known:
-            reason = f"{config.algorithm} has no such argument; allowed: {', '.join(sorted(known))}"
+            reason = f"{unknown_key(key, sorted(known))} (arguments of {config.algorithm})"
             raise BadConfig(config.name, f"learner.{key}", reason)
         if reason := misfit_of(key, config.learner[key]):
             raise BadConfig(config.name, f"learner.{key}", reason)

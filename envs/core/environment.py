@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import ABC, abstractmethod
 from dataclasses import replace
@@ -19,7 +20,7 @@ from ..scene.scene import OBSTACLE
 from ..scene.scene_objects import TABLE_HEIGHT, SceneSpec
 from ..simulation.moving_obstacles import ScheduledObstacle
 from ..simulation.render import TABLE_VIEW, Ghost, Renderer, View
-from ..simulation.simulation import PHYSICS_DT, Simulation, Start
+from ..simulation.simulation import PHYSICS_DT, Simulation, Start, substeps_at
 from ..simulation.state import State
 from ..simulation.twist_control import TwistDrive
 from . import spaces as space
@@ -102,7 +103,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         if render_mode is not None:
             checked_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         self.render_mode = render_mode
-        self.substeps = _substeps(control_frequency)
+        self.substeps = substeps_at(control_frequency)
         self.sim = Simulation(robot, replace(things, obstacles=SLOTS), arms)
         self.arms = tuple(index.arm for index in self.sim.scene.arms)
         self.metadata = {**METADATA, "render_fps": control_frequency}
@@ -136,6 +137,15 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
             obstacles=SLOTS,
             control_mode=self.control_mode,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what makes a twin, in this process or another: all but an open image or window."""
+        for draws in (self, self.action_space):
+            _ = draws.np_random  # made at its first use: each twin would make another
+        return {**self.__dict__, "_renderer": None}
+
+    def __copy__(self) -> TaskEnv[ProgressT]:
+        return copy.deepcopy(self)
 
     @property
     def task(self) -> TaskDescription:
@@ -317,14 +327,3 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
     def _more_observed(self, state: State) -> Observation:
         """Return the task-specific entries of the observation."""
         return {}
-
-
-def _substeps(control_frequency: int) -> int:
-    physics = round(1.0 / PHYSICS_DT)
-    if isinstance(control_frequency, bool) or not isinstance(control_frequency, int) or control_frequency <= 0:
-        raise BadOption("control_frequency", f"{control_frequency!r} is not a positive whole number of Hz")
-    if physics % control_frequency:
-        allowed = ", ".join(str(rate) for rate in range(10, physics + 1) if physics % rate == 0)
-        reason = f"{control_frequency} Hz does not divide {physics} Hz; allowed: {allowed}"
-        raise BadOption("control_frequency", reason)
-    return physics // control_frequency

@@ -18,23 +18,25 @@ class Level:
 
     Attributes:
         layout: name of the ranges from which starts and goals are drawn, "L0", "L1" or "L2".
+        words: what it is.
         obstacles: kind of obstacles, see `OBSTACLES`.
     """
 
     layout: str
+    words: str
     obstacles: str = "none"
 
 
 LEVELS = {
-    "L0": Level("L0"),
-    "L1": Level("L1"),
-    "L2": Level("L2"),
-    "L3": Level("L2", "static"),
-    "L4": Level("L2", "unforeseen"),
-    "F": Level("L2", "forearm"),
-    "R": Level("L1"),
-    "S": Level("L1"),
-    "T": Level("L1"),
+    "L0": Level("L0", "the demonstration's own layout"),
+    "L1": Level("L1", "starts and goals moved"),
+    "L2": Level("L2", "moved farther"),
+    "L3": Level("L2", "L2 with still obstacles", "static"),
+    "L4": Level("L2", "L2 with an obstacle that moves or appears", "unforeseen"),
+    "F": Level("L2", "L2 with an obstacle at the forearm", "forearm"),
+    "R": Level("L1", "L1 on another robot"),
+    "S": Level("L1", "L1 with a few key poses of the demonstration"),
+    "T": Level("L1", "L1 with another tool frame"),
 }
 """Levels by name. R is L1 on another robot, S L1 with a few key poses of the demonstration, T L1 with the hand
 commanded in another frame: starts and goals are those of L1, the run does the rest (keys `robot`, `key_poses` and
@@ -48,7 +50,7 @@ def level_named(name: object) -> Level:
         UnknownName: no such level.
     """
     if not isinstance(name, str) or name not in LEVELS:
-        raise UnknownName("level", name, LEVELS)
+        raise UnknownName("level", name, [f"{known} ({level.words})" for known, level in LEVELS.items()])
     return LEVELS[name]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...planner import Arm
 from ...planner.errors import BadOption, UnknownName
+from ...planner.robot.joint_limits import beyond_limit, within_limits
 
 
 def check_known(options: Iterable[str], known: tuple[str, ...]) -> None:
@@ -70,7 +71,7 @@ def checked_poses(option: str, value: Any, count: int) -> np.ndarray:
 
 
 def checked_joints(value: Any, arms: tuple[Arm, ...]) -> np.ndarray:
-    """Return joints (n_arms, dof) [rad] within the limits.
+    """Return joints (n_arms, dof) [rad] within the limits; those beyond one by rounding are at it.
 
     Args:
         value: joints (n_arms, dof) [rad]; for one arm also (dof,).
@@ -82,10 +83,8 @@ def checked_joints(value: Any, arms: tuple[Arm, ...]) -> np.ndarray:
     shape = (len(arms), arms[0].dof)
     flat = np.ndim(value) == 1 and len(arms) == 1
     joints = checked_array("joint_positions", [value] if flat else value, shape)
+    joints = np.array([within_limits(arm, q) for arm, q in zip(arms, joints, strict=True)])
     for arm, q in zip(arms, joints, strict=True):
-        outside = np.flatnonzero((q < arm.lower) | (q > arm.upper))
-        if len(outside):
-            k = int(outside[0])
-            limits = f"[{arm.lower[k]:.4g}, {arm.upper[k]:.4g}]"
-            raise BadOption("joint_positions", f"{arm.joint_names[k]} = {q[k]:.4g} is outside {limits}")
+        if beyond := beyond_limit(arm, q):
+            raise BadOption("joint_positions", beyond)
     return joints

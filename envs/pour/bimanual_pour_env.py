@@ -9,7 +9,7 @@ import numpy as np
 
 from ...planner import Pose
 from ...planner.control.inverse_kinematics import inverse_kinematics
-from ...planner.errors import BadOption
+from ...planner.errors import BadOption, told_apart
 from ...planner.geometry.shapes import pack
 from ..core import spaces as space
 from ..core.environment import TaskEnv
@@ -40,6 +40,8 @@ PLACES = ((0.14, -0.22, 1.22), (0.22, 0.16, 1.18))
 """Nominal centers [m] of the glasses at the start."""
 YAWS = np.deg2rad((60.0, -60.0))
 """Nominal approach directions [rad] of the level hands."""
+TILT = 5.0
+"""Largest tilt [degrees] of a hand with a glass in it at the start."""
 OPTIONS = ("level", "obstacles", "joint_positions")
 CLEARANCE, MARGIN = 0.03, 0.1
 """Least distance [m] of an arm at the start to the fixtures, and to its joint limits [rad]."""
@@ -200,8 +202,9 @@ class BimanualPourEnv(TaskEnv[PourProgress]):
             joints = checked_joints(options["joint_positions"], self.arms)
             for arm, q, side in zip(self.arms, joints, ARMS, strict=True):
                 tilt = float(np.degrees(np.arccos(np.clip(arm.fk(q).rotation[2, 1], -1.0, 1.0))))
-                if tilt > 5.0:
-                    reason = f"the {side} hand is {tilt:.0f} degrees from level; 5 are possible with a glass in it"
+                if tilt > TILT:
+                    found, most = told_apart(tilt, TILT, 0)
+                    reason = f"the {side} hand is {found} degrees from level; {most} are possible with a glass in it"
                     raise BadOption("joint_positions", reason)
         glasses = self._place(joints)
         beads = poured_into(glasses[SOURCE], GLASSES[SOURCE], BEADS)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.errors import BadOption
+from ...planner.errors import BadOption, told_apart
 from ..core.reset_options import checked_array
 from ..scene.scene_objects import TABLE_HEIGHT
 
@@ -115,9 +115,11 @@ def checked_stands(value: Any, arm_axis: np.ndarray) -> np.ndarray:
             raise BadOption("stands", f"{place} is not {low:g} to {high:g} m high")
         reach = float(np.linalg.norm(top[:2] - arm_axis))
         if not NEAREST <= reach <= FARTHEST:
+            found, _ = told_apart(reach, NEAREST if reach < NEAREST else FARTHEST, 2)
             limits = f"{NEAREST} to {FARTHEST} m"
-            raise BadOption("stands", f"{place} is {reach:.2f} m from the arm's base axis; {limits} is in reach")
+            raise BadOption("stands", f"{place} is {found} m from the arm's base axis; {limits} is in reach")
     apart = float(np.linalg.norm(tops[0, :2] - tops[1, :2]))
     if apart < CLOSEST:
-        raise BadOption("stands", f"they are {apart:.2f} m apart, inside each other; at least {CLOSEST} m is needed")
+        found, least = told_apart(apart, CLOSEST, 2)
+        raise BadOption("stands", f"they are {found} m apart, inside each other; at least {least} m is needed")
     return tops

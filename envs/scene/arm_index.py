@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from ...planner import Arm
+from ..mujoco_library import mujoco
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-import mujoco
 import numpy as np
 
 from ...planner import Pose
 from ...planner.errors import UnknownName
+from ..mujoco_library import compiled_model, mujoco
 from .mjcf_parts import bead_bodies, glass_body
 from .scene_objects import Beads, Glass
 
@@ -83,7 +83,7 @@ def settling(glass: Glass, beads: Beads) -> np.ndarray:
     world.extend(bead_bodies(beads))
     for joint in world.iter("joint"):
         joint.set("damping", f"{DAMPING}")
-    model = mujoco.MjModel.from_xml_string(tostring(root, encoding="unicode"))
+    model = compiled_model(tostring(root, encoding="unicode"))
     data = mujoco.MjData(model)
     data.qpos[:] = _heap(glass, beads).ravel()
     mujoco.mj_step(model, data, round(SECONDS / model.opt.timestep))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import mujoco
 import numpy as np
 
 from ...planner import Box, Capsule, Cylinder, Mesh, Obstacle, Pose, Shape, Sphere
 from ...planner.geometry.shapes import MAX_VERTICES, hull_corners
+from ..mujoco_library import mujoco
 
 PREFIX = "robot0_"
 """robosuite's name prefix of the parts of the robot."""

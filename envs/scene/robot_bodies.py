@@ -18,7 +18,7 @@ from .scene import compiled_scene
 TABLE = Path(__file__).parents[1] / "assets" / "bodies.json"
 DIGITS = 5
 """Number of decimals of the shipped lengths [m]; radii are rounded up."""
-WITH_HULLS = ("UR5e",)
+WITH_HULLS = ("UR5e", "XArm7", "Jaco")
 """Robots whose capsules alone would refuse postures that they work in: their bodies have hulls."""
 
 

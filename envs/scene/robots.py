@@ -1,21 +1,39 @@
 """Robot data that robosuite lacks: speed limits, grip range, postures for this table.
 
 Joint speed limits are the manufacturers': Franka Research 3 / Panda data sheet, Rethink's hardware specifications of
-Baxter and Sawyer, KUKA LBR iiwa 7 R800, Universal Robots UR5e, Kinova Gen3.
+Baxter and Sawyer, KUKA LBR iiwa 7 R800, Universal Robots UR5e, Kinova Gen3 and Jaco² (7 joints), UFACTORY xArm 7.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TypeVar
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ...planner.errors import BadOption, UnknownName
+from ...planner.errors import BadOption, UnknownName, told_apart
 
 Joints = tuple[float, ...]
 Places = TypeVar("Places")
+
+
+class Reach(NamedTuple):
+    """Distances [m] from an arm's first axis at which its hand can point straight down, 0.1 rad off all joint limits.
+
+    Attributes:
+        nearest: least distance of a block that is grasped on the table and lifted by 10 cm.
+        farthest: largest distance of such a block.
+        stack: largest distance of a stack on which a third block is put.
+    """
+
+    nearest: float
+    farthest: float
+    stack: float
+
+
+WHOLE_TABLE = Reach(0.32, 0.70, 0.80)
+"""A reach that includes every place of a stack."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +50,7 @@ class Robot:
         stand: x of the base [m]; None: robosuite's place.
         beside: lateral offset [m] of the base from the table's center line when one of two arms works, which puts this
             arm's shoulder on the line.
-        reach: (nearest, farthest) distance [m] from the arm's first axis at which the hand can point straight down at
-            the table.
+        reach: where the hand can point straight down.
         gripper: robosuite's name of the gripper; "default" for the robot's own. robosuite's models of Robotiq's
             two-finger grippers fold up when closed on a block: robots that come with one hold a Panda's gripper here.
         parked: joints [rad] per arm while it is idle; only for robots with two arms.
@@ -46,9 +63,15 @@ class Robot:
     ready: dict[str, Joints]
     stand: float | None = None
     beside: float = 0.0
-    reach: tuple[float, float] = (0.32, 0.70)
+    reach: Reach = WHOLE_TABLE
     gripper: str = "default"
     parked: dict[str, Joints] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle a supported robot by its name: it is the same everywhere."""
+        if ROBOTS.get(self.name) is self:
+            return robot_named, (self.name,)
+        return type(self), tuple(getattr(self, each.name) for each in fields(self))
 
     def check_grip(self, width: float, thing: str) -> None:
         """Refuse a robot whose gripper cannot hold an object of a given width.
@@ -62,8 +85,9 @@ class Robot:
         """
         low, high = self.grip
         if not low <= width <= high:
-            can = f"its gripper holds {1e3 * low:.0f} to {1e3 * high:.0f} mm"
-            raise BadOption("robot", f"{self.name} cannot hold {thing}, {1e3 * width:.0f} mm wide: {can}")
+            wide, _ = told_apart(1e3 * width, 1e3 * (low if width < low else high), 0)
+            can = f"its gripper holds {1e3 * low:g} to {1e3 * high:g} mm"
+            raise BadOption("robot", f"{self.name} cannot hold {thing}, {wide} mm wide: {can}")
 
     def place(self, arms: tuple[str, ...]) -> tuple[float | None, float]:
         """Return x (None: robosuite's) and y [m] of the base for the given working arms."""
@@ -104,7 +128,7 @@ ROBOTS: dict[str, Robot] = {
             },
             stand=-0.6,
             beside=0.2594,
-            reach=(0.34, 0.74),
+            reach=Reach(0.34, 0.74, 0.80),
             parked={
                 "right": (-0.9, 0.9, 0.0, 0.3, 0.0, 0.3, 0.0),
                 "left": (0.9, 0.9, 0.0, 0.3, 0.0, 0.3, 0.0),
@@ -121,6 +145,7 @@ ROBOTS: dict[str, Robot] = {
             (1.71, 1.71, 1.75, 2.27, 2.44, 3.14, 3.14),
             *PANDA_GRIP,
             {"right": (0.0, 0.56, 0.0, -1.529, 0.0, 1.052, 0.0)},
+            reach=Reach(0.44, 0.70, 0.80),
             gripper="PandaGripper",
         ),
         Robot(
@@ -135,6 +160,23 @@ ROBOTS: dict[str, Robot] = {
             (1.39, 1.39, 1.39, 1.39, 1.22, 1.22, 1.22),
             *PANDA_GRIP,
             {"right": (-0.057, 0.722, 0.023, 1.312, -0.017, 1.108, -1.603)},
+            reach=Reach(0.32, 0.66, 0.68),
+            gripper="PandaGripper",
+        ),
+        Robot(
+            "XArm7",
+            (3.14, 3.14, 3.14, 3.14, 3.14, 3.14, 3.14),
+            *PANDA_GRIP,
+            {"right": (0.0, 0.195, 0.0, 0.974, 0.0, 0.779, 0.0)},
+            reach=Reach(0.32, 0.66, 0.68),
+            gripper="PandaGripper",
+        ),
+        Robot(
+            "Jaco",
+            (0.628, 0.628, 0.628, 0.628, 0.837, 0.837, 0.837),
+            *PANDA_GRIP,
+            {"right": (0.0, 2.482, 0.0, 4.798, 0.0, 2.316, 0.0)},
+            reach=Reach(0.32, 0.64, 0.67),
             gripper="PandaGripper",
         ),
     )

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import copy
 import logging
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from ...planner import Arm, Obstacle
+from ...planner.deferred_imports import deferred
+from ..mujoco_library import decimal_points, mujoco
 from .arm_index import ArmIndex, arm_index
 from .fixed_shapes import static_shapes
 from .robots import Robot
@@ -25,10 +27,11 @@ a bead, or object k as FIRST_OBJECT + k."""
 
 @dataclass(frozen=True)
 class CompiledScene:
-    """A compiled scene; `model` is shared: copy it before changing it.
+    """A compiled scene; `model` is shared: copy it before changing it. Copies of the scene are the scene itself.
 
     Attributes:
         robot: the robot.
+        spec: its contents besides robot and table.
         model: MuJoCo's model.
         arms: working arms.
         home: (n_arms, dof) start joints [rad] of the working arms.
@@ -45,6 +48,7 @@ class CompiledScene:
     """
 
     robot: Robot
+    spec: SceneSpec
     model: mujoco.MjModel
     arms: tuple[ArmIndex, ...]
     home: np.ndarray
@@ -58,8 +62,17 @@ class CompiledScene:
     labels: tuple[str, ...]
     fixtures: tuple[Obstacle, ...]
 
+    def __copy__(self) -> CompiledScene:
+        return self
 
-@lru_cache(maxsize=16)
+    def __deepcopy__(self, memo: object) -> CompiledScene:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what it was compiled from."""
+        return compiled_scene, (self.robot, self.spec, tuple(index.side for index in self.arms))
+
+
 def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...] | None = None) -> CompiledScene:
     """Return the scene of a robot at a table with objects; compiled once per process.
 
@@ -71,8 +84,14 @@ def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...
     Raises:
         BadOption: the robot has no such arm.
     """
-    working = robot.checked_arms(arms)
-    env = _model_library().table_env(robot.name, robot.gripper, spec, robot.place(working))
+    return _compiled(robot, spec, robot.checked_arms(arms))
+
+
+@lru_cache(maxsize=16)
+def _compiled(robot: Robot, spec: SceneSpec, working: tuple[str, ...]) -> CompiledScene:
+    library = _model_library()
+    with decimal_points():
+        env = library.table_env(robot.name, robot.gripper, spec, robot.place(working))
     model, rob = copy.copy(env.sim.model._model), env.robots[0]
     indices = {side: arm_index(model, rob, side, robot.speeds, robot.name) for side in rob.arms}
     idle = tuple(side for side in rob.arms if side not in working)
@@ -89,6 +108,7 @@ def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...
     dof = len(robot.speeds)
     return CompiledScene(
         robot=robot,
+        spec=spec,
         model=model,
         arms=tuple(indices[side] for side in working),
         home=np.array([robot.ready[side] for side in working]),
@@ -115,15 +135,23 @@ def robot_arm(robot: Robot, index: int = 0) -> Arm:
 
 
 def _model_library() -> Any:
-    """Return the module that builds models, imported late: robosuite takes seconds and warns of optional packages."""
-    before = logging.root.manager.disable
+    """Return the module that builds models, imported late: robosuite takes seconds and warns of optional packages.
+
+    It also imports libraries that draw, and sets MUJOCO_GL for this and all further processes.
+    """
+    before, backend = logging.root.manager.disable, os.environ.get("MUJOCO_GL")
     logging.disable(logging.WARNING)
     try:
-        from . import robosuite_model
+        with deferred("PIL", "PIL.Image", "cv2", "mujoco.viewer"):
+            from . import robosuite_model
 
         return robosuite_model
     finally:
         logging.disable(before)
+        if backend is None:
+            os.environ.pop("MUJOCO_GL", None)
+        else:
+            os.environ["MUJOCO_GL"] = backend
 
 
 def _body_of(model: mujoco.MjModel, name: str) -> int:

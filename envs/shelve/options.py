@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...planner import Pose
-from ...planner.errors import BadOption
+from ...planner.errors import BadOption, told_apart
 from ..core.reset_options import checked_array, checked_poses
 from ..scene.scene_objects import TABLE_HEIGHT
 from .layout import ShelfLayout
@@ -73,10 +73,12 @@ def _standing(option: str, value: Any, nominal: tuple[Any, float], bounds: tuple
         raise BadOption(option, "is tilted; only a yaw is possible")
     if np.abs(off[:2]).max() > aside or not -lower <= off[2] <= higher:
         places = f"x {x:g}, y {y:g} by {aside:g} m, z {z - lower:.4g} to {z + higher:.4g}"
-        raise BadOption(option, f"{np.round(pose.position, 3).tolist()} is out of reach or not a place; {places}")
-    if abs((pose.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi) > turn:
-        degrees = f"{np.degrees(yaw):.0f} by {np.degrees(turn):.0f} degrees"
-        raise BadOption(option, f"yaw of {np.degrees(pose.yaw):.0f} degrees cannot be reached; allowed: {degrees}")
+        raise BadOption(option, f"{np.round(pose.position, 9).tolist()} is out of reach or not a place; {places}")
+    off_by = abs((pose.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi)
+    if off_by > turn:
+        digits = len(told_apart(np.degrees(off_by), np.degrees(turn), 0)[0].partition(".")[2])
+        given, middle, most = (f"{np.degrees(value):.{digits}f}" for value in (pose.yaw, yaw, turn))
+        raise BadOption(option, f"yaw of {given} degrees cannot be reached; allowed: {middle} by {most} degrees")
     return pose
 
 
@@ -86,9 +88,9 @@ def _lying(value: Any, count: int) -> np.ndarray:
     for k, off in enumerate(np.abs(books)):
         if (off > BOOK_SHIFT).any():
             x, y, yaw = BOOK_SHIFT
-            allowed = f"x by {x:g} m, y by {y:g} m, yaw by {yaw:.2f} rad"
+            allowed = f"x by {x:g} m, y by {y:g} m, yaw by {yaw:.4g} rad"
             raise BadOption(
-                "books", f"book {k} at {np.round(books[k], 3).tolist()} would not lie on the stand; {allowed}"
+                "books", f"book {k} at {np.round(books[k], 9).tolist()} would not lie on the stand; {allowed}"
             )
     return books
 
@@ -104,5 +106,6 @@ def _check_room(layout: ShelfLayout) -> None:
             taken = sum(layout.clutter[k, 0] + CLUTTER[k][2][1] for k in rows)
             room = 0.5 * WIDTH - taken - sign * layout.slots - reach
             if room < BESIDE:
-                reason = f"leave {room:.3f} m beside the slots of the {shelf} shelf; {BESIDE} m are needed"
+                found, least = told_apart(room, BESIDE, 2)
+                reason = f"leave {found} m beside the slots of the {shelf} shelf; {least} m are needed"
                 raise BadOption("slots", f"with the clutter on the {side} {reason}")

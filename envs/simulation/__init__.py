@@ -1,1 +1,1 @@
-"""Simulation of a scene, step by step: physics, obstacles, distances, images."""
+"""Simulation of a scene, step by step: physics, obstacles, distances, images; its state as plain arrays for copies."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from ...planner import Box, Capsule, Pose, Shape, Sphere
 from ...planner.geometry.shapes import SHAPE_KIND
+from ..mujoco_library import mujoco
 from ..scene.scene import CompiledScene
 from ..scene.scene_objects import extents, half_sizes
 
@@ -118,6 +118,14 @@ class ObstacleBodies:
             if each.motion == 0:
                 self._due[slot] = 0.0
                 self._show(slot, 0.0)
+
+    def kept(self) -> tuple[Any, ...]:
+        """Return what a copy takes over, beside what stands in model and data."""
+        return self.scheduled_obstacles, self.active, self._due
+
+    def take_over(self, kept: tuple[Any, ...]) -> None:
+        """Continue another's episode; see `kept`."""
+        self.scheduled_obstacles, self.active[:], self._due[:] = kept
 
     def advance(self, seconds: float, motion: float, has_room: Any) -> None:
         """Move all obstacles to their place at a time, and make due ones appear.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 
 from ...planner.geometry.pose import Pose
 from ...planner.jit import kernel
+from ..mujoco_library import mujoco
 from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, CompiledScene
 from .moving_obstacles import CLEARANCE
 
@@ -34,7 +34,11 @@ def _candidates(places, bounds, geoms, center, bound, best, found):
 
 
 class ObstacleDistance:
-    """Distances of a simulated robot, and of objects it holds, to obstacles."""
+    """Distances of a simulated robot, and of objects it holds, to obstacles.
+
+    Attributes:
+        so_far: smallest distance [m] of the episode up to now.
+    """
 
     def __init__(self, scene: CompiledScene, model: mujoco.MjModel, data: mujoco.MjData):
         self._model, self._data = model, data
@@ -44,11 +48,11 @@ class ObstacleDistance:
         self._objects = [np.flatnonzero(solid & (scene.owner == FIRST_OBJECT + k)) for k in range(count)]
         self._solid = scene.obstacles[:, 1]
         self._found = np.zeros(model.ngeom, dtype=np.int64)
-        self._smallest = math.inf
+        self.so_far = math.inf
 
     def reset(self) -> None:
         """Forget the previous episode."""
-        self._smallest = math.inf
+        self.so_far = math.inf
 
     def smallest(self, active: np.ndarray, touching: np.ndarray) -> float:
         """Return the smallest distance [m] so far in the episode, including the present one.
@@ -62,7 +66,7 @@ class ObstacleDistance:
             for k, geoms in enumerate(self._objects):
                 if touching[FINGERS, FIRST_OBJECT + k] or touching[OTHER_FINGERS, FIRST_OBJECT + k]:
                     self._take(slot, geoms)
-        return self._smallest
+        return self.so_far
 
     def has_room(self, slot: int, pose: Pose) -> bool:
         """Return whether an obstacle may appear at a pose: the robot and all objects are `CLEARANCE` away.
@@ -77,7 +81,7 @@ class ObstacleDistance:
         return all(self._nearest(slot, geoms, CLEARANCE) >= CLEARANCE for geoms in (self._robot, *self._objects))
 
     def _take(self, slot: int, geoms: np.ndarray) -> None:
-        self._smallest = self._nearest(slot, geoms, self._smallest)
+        self.so_far = self._nearest(slot, geoms, self.so_far)
 
     def _nearest(self, slot: int, geoms: np.ndarray, best: float) -> float:
         """Return the smaller of `best` and the distance [m] of an obstacle to the given geoms."""

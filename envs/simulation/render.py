@@ -7,49 +7,21 @@ import logging
 import os
 import weakref
 from collections.abc import Iterable
-from ctypes.util import find_library
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from ...planner import Shape
 from ..errors import RenderingUnavailable
+from ..mujoco_library import mujoco
 from ..scene.scene_objects import half_sizes
+from .opengl import OpenGL, check_not_inherited, note_opened
 
 LOGGER = logging.getLogger(__name__)
 WIDTH, HEIGHT = 640, 480
 GHOST_COLOR = (0.35, 0.55, 0.95, 0.16)
-BACKENDS = {"egl": "EGL", "osmesa": "OSMesa", "glfw": None}
-"""MuJoCo's offscreen backends, with the library that each needs."""
-
-
-def _backends() -> list[str]:
-    """Return the backends to try, in order: the one named by MUJOCO_GL, else the installed ones."""
-    wanted = os.environ.get("MUJOCO_GL", "").lower()
-    if wanted in BACKENDS:
-        return [wanted]
-    found = [name for name, library in BACKENDS.items() if library and find_library(library)]
-    return found[:1] + (["glfw"] if os.environ.get("DISPLAY") else [])
-
-
-def _opened_context(width: int, height: int) -> Any:
-    """Open an OpenGL context and make it current.
-
-    Raises:
-        RenderingUnavailable: no context could be opened.
-    """
-    reasons = []
-    for name in _backends():
-        try:
-            context = import_module(f"mujoco.{name}").GLContext(width, height)
-            context.make_current()
-            return context
-        except Exception as error:  # the backends raise whatever their libraries do
-            reasons.append(f"{name}: {error}")
-    raise RenderingUnavailable("; ".join(reasons) or "no OpenGL library found")
 
 
 @dataclass(frozen=True)
@@ -91,12 +63,6 @@ def _add(scene: mujoco.MjvScene, ghost: Ghost) -> None:
     scene.ngeom += 1
 
 
-def _free(context: mujoco.MjrContext, opengl: Any) -> None:
-    opengl.make_current()
-    context.free()
-    opengl.free()
-
-
 class _Offscreen:
     """Offscreen image buffer of a model."""
 
@@ -104,11 +70,15 @@ class _Offscreen:
         model.vis.global_.offwidth = max(WIDTH, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(HEIGHT, model.vis.global_.offheight)
         self._model = model
-        self._opengl = _opened_context(WIDTH, HEIGHT)
+        self._opengl = OpenGL(WIDTH, HEIGHT)
         self._scene = mujoco.MjvScene(model, 2000)
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-        self.close = weakref.finalize(self, _free, self._context, self._opengl)
+        with self._opengl.current():
+            try:
+                self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            except mujoco.FatalError as error:
+                raise RenderingUnavailable(" ".join(str(error).split())) from None
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self.close = weakref.finalize(self, self._opengl.free, self._context)
         # the backend shuts OpenGL down at exit: free before that, hence registered after it
         self.close.atexit = False
         atexit.register(self.close)
@@ -120,15 +90,15 @@ class _Offscreen:
         options: mujoco.MjvOption,
         ghosts: Iterable[Ghost],
     ) -> np.ndarray:
-        self._opengl.make_current()
-        viewport = mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
-        every = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(self._model, data, options, None, camera, every, self._scene)
-        for ghost in ghosts:
-            _add(self._scene, ghost)
-        mujoco.mjr_render(viewport, self._scene, self._context)
-        pixels = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(pixels, None, viewport, self._context)
+        with self._opengl.current():
+            viewport = mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
+            every = mujoco.mjtCatBit.mjCAT_ALL
+            mujoco.mjv_updateScene(self._model, data, options, None, camera, every, self._scene)
+            for ghost in ghosts:
+                _add(self._scene, ghost)
+            mujoco.mjr_render(viewport, self._scene, self._context)
+            pixels = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
+            mujoco.mjr_readPixels(pixels, None, viewport, self._context)
         return np.ascontiguousarray(pixels[::-1])
 
 
@@ -165,8 +135,10 @@ class Renderer:
         """Update the window; the first call opens it, if there is a display."""
         if self._window is None and not self._has_display():
             return
+        check_not_inherited()
         if self._window is None:
             viewer = import_module("mujoco.viewer")
+            note_opened("window")
             self._window = viewer.launch_passive(self._model, data, show_left_ui=False, show_right_ui=False)
             self._aim(self._window.cam)
             self._window.opt.geomgroup[:] = self._options.geomgroup

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
+from ...planner.errors import BadOption
 from ...planner.robot.kinematics import FRAME
+from ..mujoco_library import mujoco
 from ..scene.arm_index import ArmIndex
 from ..scene.robots import Robot
-from ..scene.scene import FINGERS, FIRST_OBJECT, compiled_scene
+from ..scene.scene import FINGERS, FIRST_OBJECT, CompiledScene, compiled_scene
 from ..scene.scene_objects import SceneSpec
 from .moving_obstacles import ObstacleBodies, ScheduledObstacle
 from .obstacle_distance import ObstacleDistance
+from .snapshot import put, taken
 from .state import State, command, read_arms, read_objects
 
 PHYSICS_DT = 0.002
@@ -42,10 +44,33 @@ class Start(NamedTuple):
 
 
 class Simulation:
-    """A simulated scene: action in, physics, state out."""
+    """A simulated scene: action in, physics, state out.
+
+    Copies and pickles go on as the simulation would. They hold its state, not what is compiled or only looks into
+    MuJoCo's memory.
+    """
 
     def __init__(self, robot: Robot, things: SceneSpec, sides: tuple[str, ...] | None = None):
-        self.scene = compiled_scene(robot, things, sides)
+        self._build(compiled_scene(robot, things, sides))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "scene": self.scene,
+            "physics": taken(self.scene.model, self.model, self.data),
+            "touching": self._touching,
+            "obstacles": self.obstacles.kept(),
+            "nearest": self._near.so_far,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._build(state["scene"])
+        put(state["physics"], self.model, self.data)
+        self._touching[:] = state["touching"]
+        self.obstacles.take_over(state["obstacles"])
+        self._near.so_far = state["nearest"]
+
+    def _build(self, scene: CompiledScene) -> None:
+        self.scene = scene
         self.model = copy.copy(self.scene.model)
         self.data = mujoco.MjData(self.model)
         arms, data, model = self.scene.arms, self.data, self.model
@@ -60,7 +85,7 @@ class Simulation:
         self._chains = np.array([arm.arm.chain for arm in arms])
         self._frames = np.empty((arms[0].arm.dof, FRAME.width))
         self._arm_index = np.array([[*arm.qpos, *arm.qvel, arm.site, *arm.pads] for arm in arms])
-        bodies, owners = self.scene.objects, FIRST_OBJECT + len(things.objects)
+        bodies, owners = self.scene.objects, FIRST_OBJECT + len(self.scene.objects)
         self._object_places = model.jnt_qposadr[model.body_jntadr[bodies]].astype(np.int64)
         self._object_index = np.column_stack([self._object_places, model.body_dofadr[bodies]])
         self._touching = np.zeros((owners, owners))
@@ -178,3 +203,19 @@ class Simulation:
             self.data.qpos[each.finger_qpos] = each.finger_open
         mujoco.mj_forward(self.model, self.data)
         return mujoco.mj_geomDistance(self.model, self.data, *arm.pads, 1.0, None)
+
+
+def substeps_at(control_frequency: int) -> int:
+    """Return the number of physics steps per action at a control frequency [Hz].
+
+    Raises:
+        BadOption: the frequency does not divide that of the physics.
+    """
+    physics = round(1.0 / PHYSICS_DT)
+    if isinstance(control_frequency, bool) or not isinstance(control_frequency, int) or control_frequency <= 0:
+        raise BadOption("control_frequency", f"{control_frequency!r} is not a positive whole number of Hz")
+    if physics % control_frequency:
+        allowed = ", ".join(str(rate) for rate in range(10, physics + 1) if physics % rate == 0)
+        reason = f"{control_frequency} Hz does not divide {physics} Hz; allowed: {allowed}"
+        raise BadOption("control_frequency", reason)
+    return physics // control_frequency

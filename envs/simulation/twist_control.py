@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from ...planner.control.linear import backward_solve, cholesky, forward_solve, gram
 from ...planner.geometry.pose import Pose
 from ...planner.jit import kernel
+from ..mujoco_library import mujoco
 from ..scene.servos import DAMPING, STIFFNESS
 from .simulation import Simulation
 
@@ -34,12 +34,13 @@ class TwistDrive:
     """
 
     def __init__(self, simulation: Simulation, dt: float):
-        self._sim, self._arms, self._dt = simulation, simulation.scene.arms, dt
-        self._speeds = np.zeros((len(self._arms), self._arms[0].arm.dof))
+        self._sim, self._dt = simulation, dt
+        arms = simulation.scene.arms
+        self._speeds = np.zeros((len(arms), arms[0].arm.dof))
         self._changes = np.zeros_like(self._speeds)
-        self._wanted = np.zeros(self._arms[0].arm.dof)
+        self._wanted = np.zeros(arms[0].arm.dof)
         self._inertia = np.zeros((simulation.model.nv, simulation.model.nv))
-        self._torques = [simulation.model.actuator_forcerange[index.ctrl, 1].copy() for index in self._arms]
+        self._torques = [simulation.model.actuator_forcerange[index.ctrl, 1].copy() for index in arms]
         self._work = np.zeros((SOLUTION + 1, 6))
 
     def reset(self) -> None:
@@ -54,7 +55,7 @@ class TwistDrive:
         """
         data, rates = self._sim.data, np.empty_like(self._speeds)
         mujoco.mj_fullM(self._sim.model, self._inertia, data.qM)
-        for k, (index, twist) in enumerate(zip(self._arms, twists, strict=True)):
+        for k, (index, twist) in enumerate(zip(self._sim.scene.arms, twists, strict=True)):
             x, jacobian = index.arm.fk_jacobian(data.qpos[index.qpos])
             _resolved(jacobian, Pose(x).rotation, twist, index.arm.velocity_limits, self._work, self._wanted)
             mine = self._inertia, index.qvel, self._torques[k]

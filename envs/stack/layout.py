@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...planner.errors import BadOption
+from ..scene.robots import WHOLE_TABLE, Reach
 
 BASE_PLACE = (0.10, 0.0)
 """Nominal position x, y [m] of the stack on the table."""
@@ -14,8 +15,6 @@ SPACING, ROW_X = 0.22, (-0.08, -0.22)
 """Distance of blocks in a row, and x of the first and second row [m]; three blocks fill a row."""
 BLOCK_GAP, BASE_GAP = 0.12, 0.17
 """Least distance of block centers to each other and to the base place [m]."""
-REACH = (0.32, 0.70)
-"""Range of the blocks' distance from the arm's base axis [m]: a Panda reaches it with its hand pointing down."""
 TABLE_EDGE = 0.36
 """Largest |x| and |y| of a block's center on the table [m]."""
 LONG_GAP = 0.30
@@ -76,7 +75,7 @@ def stack_layout(
     arm_axis: np.ndarray,
     joints: tuple[int, ...],
     base_gap: float = BASE_GAP,
-    reach: tuple[float, float] = REACH,
+    reach: Reach = WHOLE_TABLE,
 ) -> StackLayout:
     """Draw a layout of blocks and base place by rejection, independent of any method.
 
@@ -87,7 +86,7 @@ def stack_layout(
         arm_axis: (2,) x, y of the arm's base axis [m].
         joints: shape (n_arms, dof) of the start joints.
         base_gap: least distance of the blocks to the base place [m].
-        reach: least and largest distance of the blocks from the arm's axis [m].
+        reach: least and largest distance of the blocks, and largest of the base place, from the arm's axis [m].
 
     Raises:
         BadOption: no layout was found in `MAX_TRIES` tries.
@@ -101,7 +100,8 @@ def stack_layout(
             yaws = rng.uniform(-ranges.yaw, ranges.yaw, count + 1)
             blocks = np.column_stack([places, yaws[:count]])
             return StackLayout(blocks, np.append(base, yaws[count]), offsets)
-    raise BadOption("n_blocks", f"{count} blocks do not fit on the table at this level")
+    within = f"{reach.nearest:.2f} to {reach.farthest:.2f} m from the arm's axis"
+    raise BadOption("n_blocks", f"{count} blocks do not fit on the table at this level, {within}")
 
 
 def fits(
@@ -109,7 +109,7 @@ def fits(
     base: np.ndarray,
     arm_axis: np.ndarray,
     base_gap: float = BASE_GAP,
-    reach: tuple[float, float] = REACH,
+    reach: Reach = WHOLE_TABLE,
 ) -> bool:
     """Return whether blocks keep their distances to each other, to the base place and to the arm's axis.
 
@@ -118,13 +118,14 @@ def fits(
         base: (2,) position of the base place [m].
         arm_axis: (2,) x, y of the arm's base axis [m].
         base_gap: least distance of the blocks to the base place [m].
-        reach: least and largest distance of the blocks from the arm's axis [m].
+        reach: least and largest distance of the blocks, and largest of the base place, from the arm's axis [m].
     """
     away = np.linalg.norm(places - arm_axis, axis=1)
     between = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
     return bool(
-        (away >= reach[0]).all()
-        and (away <= reach[1]).all()
+        (away >= reach.nearest).all()
+        and (away <= reach.farthest).all()
+        and np.linalg.norm(base - arm_axis) <= reach.stack
         and (np.abs(places) <= TABLE_EDGE).all()
         and (between >= BLOCK_GAP).all()
         and (np.linalg.norm(places - base, axis=1) >= base_gap).all()

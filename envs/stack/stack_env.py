@@ -74,8 +74,8 @@ class StackEnv(TaskEnv[StackProgress]):
     ## Starting State
     By `level`: L0 the nominal row; L1 blocks moved by up to 10 cm and turned by up to 30 degrees, the base place by
     up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
-    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis (Baxter: 0.34 to 0.74 m),
-    where its hand can point straight down.
+    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis, where a Panda's hand can point
+    straight down; blocks and base place keep to a robot's own reach, `ROBOTS[robot].reach`, where it differs.
 
     L3, L4 and F are L2 with obstacles: L3 has one to three static ones of 3 to 10 cm on the hand's path, L4 one that
     swings across the path at up to 0.3 m/s or appears during a carry, F a static one where the forearm passes.

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import checked_kind
+from ..arrays import checked_kind, checked_settings
 from ..columns import packed_row
 from ..geometry import screw
 from ..geometry.pose import Pose
@@ -303,7 +303,7 @@ class Controller:
 
     def __init__(self, arm: Arm, settings: ControllerSettings | None = None):
         self.arm = checked_kind("arm", arm, Arm)
-        self.settings = settings or ControllerSettings()
+        self.settings = checked_settings(ControllerSettings, settings)
         self._work = arm_arrays(arm, self.settings.packed())
         self._sign = 0.0
 

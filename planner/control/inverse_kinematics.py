@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,10 +60,27 @@ def inverse_kinematics(arm: Arm, target: Pose, seed: ArrayLike, *, iterations: i
     return q if reached else None
 
 
-def nearest_reached(
-    arm: Arm, target: Pose, seeds: Iterable[ArrayLike], *, iterations: int = 300
-) -> tuple[float, float]:
-    """Return how near inverse kinematics comes to a pose: distance [m] and angle [rad] at the best of its ends.
+class Reached(NamedTuple):
+    """Where a search of inverse kinematics ends.
+
+    Attributes:
+        joints: (dof,) joints [rad or m].
+        distance: of the tcp from the wanted position [m].
+        angle: of the tcp from the wanted rotation [rad].
+    """
+
+    joints: np.ndarray
+    distance: float
+    angle: float
+
+    @property
+    def there(self) -> bool:
+        """True within 0.1 mm and 1 mrad."""
+        return self.distance < POSITION_TOLERANCE and self.angle < ANGLE_TOLERANCE
+
+
+def nearest_reached(arm: Arm, target: Pose, seeds: Iterable[ArrayLike], *, iterations: int = 300) -> Reached:
+    """Return the end of inverse kinematics that is nearest to a pose.
 
     Args:
         arm: the arm.
@@ -73,8 +91,9 @@ def nearest_reached(
     Raises:
         WrongType, BadShape, NotFinite, BadOption: as `inverse_kinematics`.
     """
-    ends = (arm.fk(_searched(arm, target, seed, iterations)[0]).distance_to(target) for seed in seeds)
-    return min(ends, key=lambda end: math.hypot(end[0], METERS_PER_RADIAN * end[1]))
+    ends = (_searched(arm, target, seed, iterations)[0] for seed in seeds)
+    found = (Reached(q, *arm.fk(q).distance_to(target)) for q in ends)
+    return min(found, key=lambda end: math.hypot(end.distance, METERS_PER_RADIAN * end.angle))
 
 
 def _searched(arm: Arm, target: Pose, seed: ArrayLike, iterations: int) -> tuple[np.ndarray, bool]:

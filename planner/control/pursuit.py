@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import checked_kind
+from ..arrays import checked_kind, checked_settings
 from ..columns import packed_row
 from ..errors import BadOption
 from ..geometry import screw
@@ -207,10 +207,10 @@ class Pursuit:
     ):
         check_range("dt", dt, "(0, inf)")
         self.arm, self.path, self.dt = checked_kind("arm", arm, Arm), checked_kind("path", path, PosePath), dt
-        controller = controller or ControllerSettings()
+        controller = checked_settings(ControllerSettings, controller, "controller")
         if not 0 < controller.gain * dt <= 1:
             raise BadOption("gain", f"gain * dt = {controller.gain * dt:g} is not in (0, 1]")
-        self._work = arm_arrays(arm, controller.packed(), (settings or PursuitSettings()).packed())
+        self._work = arm_arrays(arm, controller.packed(), checked_settings(PursuitSettings, settings).packed())
         self._pursuit_state = fresh_pursuit_state()
 
     @property

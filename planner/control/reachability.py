@@ -1,16 +1,19 @@
-"""Why an arm does not get to a goal: how far it reaches, or how near inverse kinematics comes."""
+"""Why an arm does not get to a goal: how far it reaches, which limit is in its way, or how near it comes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import told_apart
 from ..geometry.pose import Pose
 from ..robot.arm import Arm
+from ..robot.joint_limits import beyond_limit, near_limit
 from ..robot.kinematics import CHAIN, PRISMATIC
-from .inverse_kinematics import ANGLE_TOLERANCE, POSITION_TOLERANCE, nearest_reached
+from .inverse_kinematics import Reached, nearest_reached
 
 GUESSES = 8
 """Random starts of inverse kinematics, besides the joints at the start."""
@@ -40,12 +43,59 @@ def why_not_reached(arm: Arm, goal: Pose, start: np.ndarray, *, search: bool = T
     away, reach = float(np.linalg.norm(goal.position - base)), max_reach(arm)
     if away > reach:
         one, other = told_apart(away, reach, 2)
-        return f"the goal is {one} m from the base, the arm reaches at most {other} m"
+        return f"the goal is {one} m from the first joint, {arm.joint_names[0]}; the arm reaches at most {other} m"
     if not search:
         return ""
     rng, low, high = np.random.default_rng(0), np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
-    guesses = rng.uniform(np.minimum(low, high), high, (GUESSES, arm.dof))
-    distance, angle = nearest_reached(arm, goal, [start, *guesses])
-    if distance < POSITION_TOLERANCE and angle < ANGLE_TOLERANCE:
+    guesses = [start, *rng.uniform(np.minimum(low, high), high, (GUESSES, arm.dof))]
+    found = nearest_reached(arm, goal, guesses)
+    beyond = [] if found.there else _beyond_limits(arm, goal, guesses)
+    if found.there or "" in beyond:
         return "the arm reaches the goal, but does not follow the path to it"
-    return f"inverse kinematics comes no nearer to the goal than {distance:.3g} m and {angle:.3g} rad"
+    if beyond:
+        return f"within reach, but only beyond a joint limit: {beyond[0]}"
+    return _not_turned_so(arm, goal, found) or f"inverse kinematics ends {gap(arm, goal, found.joints)}"
+
+
+def gap(arm: Arm, goal: Pose, q: np.ndarray) -> str:
+    """Return how far the tcp is from a goal, and the joint that is near its limit, in words.
+
+    Args:
+        arm: the arm.
+        goal: pose of the tcp.
+        q: (dof,) joints now.
+    """
+    distance, angle = arm.fk(q).distance_to(goal)
+    near = near_limit(arm, q)
+    return f"{distance:.3f} m and {math.degrees(angle):.1f} degrees from the goal{f'; {near}' if near else ''}"
+
+
+def _beyond_limits(arm: Arm, goal: Pose, guesses: Sequence[np.ndarray]) -> list[str]:
+    """Return what limits are exceeded where the goal is reached by joints that turn without limits, the least first.
+
+    A text is "" where the limits are kept after all.
+    """
+    turns = arm.chain[:-1, CHAIN.kind] != PRISMATIC
+    free = replace(arm, lower=np.where(turns, -np.inf, arm.lower), upper=np.where(turns, np.inf, arm.upper))
+    ends = (nearest_reached(free, goal, [guess]) for guess in guesses)
+    wound = [_wound(arm, end.joints, turns) for end in ends if end.there]
+    wound.sort(key=lambda q: -arm.margin(q))
+    return [beyond_limit(arm, q) for q in wound]
+
+
+def _wound(arm: Arm, q: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Return the same posture with each joint that turns as near to the middle of its limits as whole turns allow."""
+    limited = turns & np.isfinite(arm.lower) & np.isfinite(arm.upper)
+    middle = q.copy()
+    middle[limited] = 0.5 * (arm.lower[limited] + arm.upper[limited])
+    return q - 2.0 * math.pi * np.round((q - middle) / (2.0 * math.pi))
+
+
+def _not_turned_so(arm: Arm, goal: Pose, found: Reached) -> str:
+    """Say that only the goal's position is reached; "" if not even that is found to be."""
+    place = Pose.from_position_quaternion(goal.position, arm.fk(found.joints).quaternion)
+    there = nearest_reached(arm, place, [found.joints])
+    if not there.there:
+        return ""
+    angle = math.degrees(arm.fk(there.joints).distance_to(goal)[1])
+    return f"the arm reaches the goal's position, but not its rotation: {angle:.1f} degrees off at the nearest found"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import check_capacity, checked_array, checked_items, checked_kind
+from ..arrays import check_capacity, checked_array, checked_items, checked_kind, checked_settings
 from ..collision.edge_certificates import tool_arrays, tool_slack
 from ..columns import packed_row
 from ..errors import BadOption
@@ -255,7 +255,7 @@ def escape_path(
         BadOption: too many obstacles, poses or capsules, masks that fit neither them nor the obstacles, or a seed that
             is no whole number.
     """
-    settings = settings or RepetSettings()
+    settings = checked_settings(RepetSettings, settings)
     checked_kind("path", path, PosePath)
     obstacles = checked_items("obstacles", obstacles, Obstacle)
     check_capacity("obstacles", len(obstacles), MAX_OBSTACLES)

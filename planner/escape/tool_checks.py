@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
-from ..arrays import check_capacity, checked_array
+from ..arrays import check_capacity, checked_array, checked_items
 from ..collision.robot_arrays import MAX_CAPSULES
 from ..errors import BadOption
 from ..ranges import check_count
@@ -36,6 +37,7 @@ def checked_masks(masks: Sequence[int], capsules: int, obstacles: int) -> Sequen
     Raises:
         BadOption: another number of masks, or one with more bits than there are capsules.
     """
+    masks = cast(Sequence[int], checked_items("masks", masks, object))
     if len(masks) not in (0, obstacles):
         raise BadOption("masks", f"there are {len(masks)} for {obstacles} obstacles")
     for k, mask in enumerate(masks):

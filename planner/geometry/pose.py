@@ -9,8 +9,9 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import checked_array, checked_kind, frozen, numbers
+from ..arrays import FrozenArrays, checked_array, checked_kind, frozen, numbers
 from ..errors import BadShape, NotUnit
+from ..ranges import check_range
 from . import dualquat as dq
 
 METERS_PER_RADIAN = 0.2
@@ -19,7 +20,7 @@ and a rotation by theta [rad]. "Path length" means this everywhere in the projec
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pose:
+class Pose(FrozenArrays):
     """Pose of frame b in frame a, named `a_from_b`; composes as `world_from_tcp @ tcp_from_cup`.
 
     Attributes:
@@ -86,6 +87,7 @@ class Pose:
             position: (3,) [m].
             yaw: rotation about z [rad].
         """
+        check_range("yaw", yaw, "(-inf, inf)")
         return Pose.from_position_quaternion(position, [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
 
     @property
@@ -154,7 +156,7 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosePath:
+class PosePath(FrozenArrays):
     """A sequence of poses in one frame.
 
     Attributes:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import checked_array, checked_kind, frozen, numbers
+from ..arrays import FrozenArrays, checked_array, checked_kind, frozen, numbers
 from ..errors import BadShape, UnfitShape, WrongType
 from .pose import Pose
 
@@ -54,10 +54,17 @@ class ObstacleColumns(NamedTuple):
 SHAPE_KIND, OBSTACLE = ShapeKinds(), ObstacleColumns()
 
 
+def _number(what: str, value: float) -> float:
+    try:
+        if not isinstance(value, str):
+            return float(value)
+    except TypeError:
+        pass
+    raise WrongType(what, value, "a length [m]")
+
+
 def _length(shape: str, name: str, value: float) -> float:
-    if isinstance(value, str):
-        raise WrongType(f"{shape}: {name}", value, "a length [m]")
-    number = float(value)
+    number = _number(f"{shape}: {name}", value)
     if not math.isfinite(number) or not SMALLEST <= number <= LARGEST:
         raise UnfitShape(shape, name, f"{value!r} is not a length from {SMALLEST:g} to {LARGEST:g} m")
     return number
@@ -133,7 +140,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
+class Mesh(FrozenArrays):
     """A convex polyhedron: the hull of its vertices.
 
     Attributes:
@@ -195,7 +202,7 @@ Shape = Sphere | Capsule | Box | Cylinder | Mesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Obstacle:
+class Obstacle(FrozenArrays):
     """A shape in the world, at rest or moving along a straight line.
 
     Attributes:
@@ -219,7 +226,7 @@ class Obstacle:
         if not isinstance(self.shape, Shape):
             raise WrongType(f"{label}: shape", self.shape, "a Sphere, Capsule, Box, Cylinder or Mesh")
         checked_kind(f"{label}: pose", self.pose, Pose)
-        if self.margin is not None and not 0.0 <= self.margin <= LARGEST:
+        if self.margin is not None and not 0.0 <= _number(f"{label}: margin", self.margin) <= LARGEST:
             raise UnfitShape(label, "margin", f"{self.margin!r} is not a length from 0 to {LARGEST:g} m")
         _set(self, velocity=velocity)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import frozen, numbers
+from ..arrays import FrozenArrays, frozen, numbers
 from ..errors import BadOption, BadShape, NotFinite
 from ..jit import kernel
 from ..ranges import check_choice, check_range
@@ -66,7 +66,7 @@ def _worst_between(dqs, lengths, first, last, lever):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SmoothPath:
+class SmoothPath(FrozenArrays):
     """A C1 curve through poses with given body twists; the parameter u has the unit of the knots.
 
     Attributes:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from ..arrays import checked_items, checked_kind
 from ..errors import BadDemonstration, UnknownName
 from ..geometry.pose import Pose, PosePath
-from .segmentation import dwells
+from ..ranges import check_count
 
 SOURCES = ("teleoperated", "kinesthetic", "scripted")
 GRIPPER_ACTIONS = ("close", "open", "none")
@@ -28,6 +30,10 @@ LONGEST_NAME = 100
 """Largest number of characters of a robot's name."""
 FARTHEST = 10.0
 """Largest plausible coordinate [m]; larger positions are not in meters."""
+LONGEST = 3600.0
+"""Longest plausible duration [s]; a longer one is not in seconds."""
+SLOWEST, SOME_WAY = 1e-3, 0.05
+"""Least plausible mean speed [m/s] of a hand that covers this distance [m]; a slower one has time in another unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +75,15 @@ class Demonstration:
         joint_positions: (n, dof) [rad], None if not recorded.
         gripper: (n,) command, positive closes; None if not recorded.
         segments: the motions, in order.
-        object_sizes: full extents (3,) [m] of the objects named in the segments.
+        object_sizes: full extents (3,) [m] of objects.
+        object_paths: n poses in the world of each object that was recorded.
+        fixtures: pose in the world of each thing that stood still.
+        other_joints: (n,) positions [rad or m] of joints that are not the arm's: of fingers, doors, drawers.
+        commanded: n poses in the world that the tcp was sent to; None if not recorded.
 
     Raises:
         BadDemonstration: an invalid field; the error names the field and the reason.
+        WrongType, BadOption: a segment, or one of its fields, is of a wrong class.
     """
 
     name: str
@@ -86,7 +97,11 @@ class Demonstration:
     joint_positions: np.ndarray | None = None
     gripper: np.ndarray | None = None
     segments: tuple[Segment, ...] = ()
-    object_sizes: dict[str, np.ndarray] = field(default_factory=dict)
+    object_sizes: Mapping[str, np.ndarray] = field(default_factory=dict)
+    object_paths: Mapping[str, PosePath] = field(default_factory=dict)
+    fixtures: Mapping[str, Pose] = field(default_factory=dict)
+    other_joints: Mapping[str, np.ndarray] = field(default_factory=dict)
+    commanded: PosePath | None = None
 
     def __post_init__(self):
         name = self.robot
@@ -110,14 +125,68 @@ class Demonstration:
         steps = np.diff(self.time)
         if (steps <= 0).any():
             raise self._bad("time", f"does not increase at index {int(np.argmax(steps <= 0)) + 1}")
-        farthest = np.abs(self.path.positions).max(axis=1)
-        if farthest.max() > FARTHEST:
-            index = int(farthest.argmax())
-            raise self._bad("path", f"sample {index} is {farthest[index]:.4g} m away; are the positions in cm or mm?")
+        self._check_places("path", self.path)
+        self._check_duration()
         object.__setattr__(self, "object_sizes", self._checked_sizes())
+        self._check_scene(count)
         self._check_segments(count)
 
+    def _check_places(self, key: str, path: PosePath) -> None:
+        farthest = np.abs(path.positions).max(axis=1)
+        if farthest.max() > FARTHEST:
+            index = int(farthest.argmax())
+            raise self._bad(key, f"sample {index} is {farthest[index]:.4g} m away; are the positions in cm or mm?")
+
+    def _check_duration(self) -> None:
+        seconds = self.duration
+        way = float(np.linalg.norm(np.diff(self.path.positions, axis=0), axis=1).sum())
+        if seconds > LONGEST:
+            raise self._bad("time", f"lasts {seconds:.6g} s; is it in ms, us or ns?")
+        if way > SOME_WAY and way < SLOWEST * seconds:
+            reason = (
+                f"lasts {seconds:.6g} s for a way of {way:.3g} m: is it in ms, us or ns, or the path not in meters?"
+            )
+            raise self._bad("time", reason)
+
+    def _check_scene(self, count: int) -> None:
+        """Check what was recorded besides the arm, and keep it where nobody changes it."""
+        for key, kind in (("object_paths", PosePath), ("fixtures", Pose)):
+            for name, value in checked_kind(key, getattr(self, key), Mapping).items():
+                if not isinstance(value, kind):
+                    raise self._bad(key, f"of {name!r} is a {type(value).__name__}, no {kind.__name__}")
+        paths = {f"object_paths of {name!r}": path for name, path in self.object_paths.items()}
+        if self.commanded is not None:
+            if not isinstance(self.commanded, PosePath):
+                raise self._bad("commanded", f"is a {type(self.commanded).__name__}, no PosePath")
+            paths["commanded"] = self.commanded
+        for key, path in paths.items():
+            if len(path) != count:
+                raise self._bad(key, f"has {len(path)} poses; path has {count}")
+            self._check_places(key, path)
+        for name, pose in self.fixtures.items():
+            self._check_places(f"fixtures of {name!r}", PosePath(pose.dq[None]))
+        both = sorted(set(self.object_paths) & set(self.fixtures))
+        if both:
+            raise self._bad("fixtures", f"{both[0]!r} is among object_paths, too")
+        others = {
+            name: self._checked(f"other_joints of {name!r}", value, count, 1)
+            for name, value in checked_kind("other_joints", self.other_joints, Mapping).items()
+        }
+        for key, value in (
+            ("object_paths", dict(self.object_paths)),
+            ("fixtures", dict(self.fixtures)),
+            ("other_joints", others),
+        ):
+            object.__setattr__(self, key, value)
+
     def _check_segments(self, count: int) -> None:
+        object.__setattr__(self, "segments", checked_items("segments", self.segments, Segment))
+        for segment in self.segments:
+            for key in ("name", "reference", "held", "gripper"):
+                checked_kind(f"segment: {key}", getattr(segment, key), str)
+            checked_kind(f"segment {segment.name!r}: reference_pose", segment.reference_pose, Pose)
+            for key in ("start", "stop"):
+                check_count(f"segment {segment.name!r}: {key}", getattr(segment, key), "(-inf, inf)")
         names = [segment.name for segment in self.segments]
         if len(set(names)) < len(names):
             raise self._bad("segments", f"names are not unique: {', '.join(names)}")
@@ -136,17 +205,17 @@ class Demonstration:
 
     def _check_objects(self, key: str, segment: Segment) -> None:
         """Refuse reference and held objects that are unknown, if objects are listed, and poses in another unit."""
+        known = list(dict.fromkeys([*self.object_sizes, *self.object_paths, *self.fixtures]))
         for role, name in (("reference", segment.reference), ("held", segment.held)):
-            if self.object_sizes and name not in ("", *self.object_sizes):
-                allowed = ", ".join(self.object_sizes)
-                raise self._bad(key, f"{role} {name!r} is not in object_names; allowed: {allowed}, ''")
+            if known and name not in ("", *known):
+                raise self._bad(key, f"{role} {name!r} is not in object_names; allowed: {', '.join(known)}, ''")
         farthest = float(np.abs(segment.reference_pose.position).max())
         if farthest > FARTHEST:
             raise self._bad(key, f"the reference pose is {farthest:.4g} m away; is it in cm or mm?")
 
     def _checked_sizes(self) -> dict[str, np.ndarray]:
         sizes = {}
-        for name, value in self.object_sizes.items():
+        for name, value in checked_kind("object_sizes", self.object_sizes, Mapping).items():
             size = self._numbers("object_sizes", value)
             if size.shape != (3,):
                 raise self._bad("object_sizes", f"of {name!r} has shape {size.shape}; expected (3,) [m]")
@@ -204,26 +273,3 @@ class Demonstration:
         """
         segment = self.segment(name)
         return self.path[segment.start : segment.stop + 1]
-
-
-def warnings_of(demonstration: Demonstration) -> list[str]:
-    """List peculiarities of a demonstration to know before using it; none of them is an error."""
-    found = []
-    time, path = demonstration.time, demonstration.path
-    for first, last in dwells(time, path):
-        found.append(f"pause of {time[last] - time[first]:.1f} s from sample {first} to {last}")
-    steps = np.diff(path.lengths())
-    repeated = int((steps < 2e-4).sum())
-    if repeated > 0.05 * len(steps):
-        found.append(f"{repeated} of {len(steps)} steps are shorter than 0.2 mm: pauses or repeated samples")
-    intervals = np.diff(time)
-    if intervals.max() > 1.5 * np.median(intervals):
-        found.append(f"time steps vary from {intervals.min() * 1e3:.0f} to {intervals.max() * 1e3:.0f} ms")
-    if not demonstration.segments:
-        found.append("no segments: neither gripper events nor pauses were found")
-    for segment in demonstration.segments:
-        pose = path[segment.stop]
-        down = np.degrees(np.arccos(np.clip(-pose.rotation[2, 2], -1.0, 1.0)))
-        if segment.gripper != "none" and 2.0 < down < 45.0:
-            found.append(f"the tool is tilted by {down:.1f} deg at the end of {segment.name!r}: imitated as it is")
-    return found

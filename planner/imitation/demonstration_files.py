@@ -1,26 +1,20 @@
-"""Demonstrations as .npz files. Reading never runs code and never expands more than the announced size."""
+"""Demonstrations as .npz files."""
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..arrays import checked_file, checked_kind
 from ..errors import BadDemonstration, OneDemoError
 from ..geometry.pose import Pose, PosePath
 from .demonstration import Demonstration, Segment
+from .npz_arrays import numbers, read_arrays, text, texts, unique_names, unit_poses
 
 FORMAT_VERSION = 1
 UNITS = "m s rad wxyz"
-MAX_BYTES = 64 * 2**20
-UNIT_QUATERNION = 1e-3
-"""Largest deviation of a quaternion's norm that counts as rounding (recordings in single precision, logs with four
-digits); beyond it the numbers are not a quaternion."""
-UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, SyntaxError, RuntimeError, ArithmeticError)
-"""Errors raised by zipfile, zlib and NumPy on damaged files; encrypted or exotic archives raise a RuntimeError."""
 TEXTS = ("name", "task", "robot", "tcp_frame", "source", "licence", "units")
 REQUIRED = (*TEXTS, "format_version", "time", "poses")
 OPTIONAL = (
@@ -34,6 +28,13 @@ OPTIONAL = (
     "segment_gripper",
     "object_names",
     "object_sizes",
+    "object_path_names",
+    "object_paths",
+    "fixture_names",
+    "fixture_poses",
+    "other_joint_names",
+    "other_joints",
+    "commanded_poses",
 )
 
 
@@ -43,8 +44,12 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
     Args:
         demonstration: the demonstration.
         path: of the file, overwritten if present.
+
+    Raises:
+        WrongType: no demonstration, or no path.
     """
-    demo, segments = demonstration, demonstration.segments
+    demo, path = checked_kind("demonstration", demonstration, Demonstration), checked_file(path)
+    segments = demo.segments
     arrays: dict[str, Any] = {
         "format_version": FORMAT_VERSION,
         "units": UNITS,
@@ -63,24 +68,43 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
     for key in ("joint_positions", "gripper"):
         if getattr(demo, key) is not None:
             arrays[key] = getattr(demo, key)
-    texts = {key: np.array(value, dtype=str) for key, value in arrays.items() if _is_text(value)}
+    arrays |= _scene_arrays(demo)
+    words = {key: np.array(value, dtype=str) for key, value in arrays.items() if _is_text(value)}
     path = Path(path)
     part = path.with_name(f"{path.name}.part")
     try:
         with part.open("wb") as file:
-            np.savez_compressed(file, **{**arrays, **texts})
+            np.savez_compressed(file, **{**arrays, **words})
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def _scene_arrays(demo: Demonstration) -> dict[str, Any]:
+    """Return the entries of what was recorded besides the arm; none for what was not."""
+    arrays: dict[str, Any] = {}
+    if demo.object_paths:
+        arrays["object_path_names"] = list(demo.object_paths)
+        arrays["object_paths"] = np.array([path.vectors for path in demo.object_paths.values()])
+    if demo.fixtures:
+        arrays["fixture_names"] = list(demo.fixtures)
+        arrays["fixture_poses"] = np.array([pose.vector for pose in demo.fixtures.values()])
+    if demo.other_joints:
+        arrays["other_joint_names"] = list(demo.other_joints)
+        arrays["other_joints"] = np.column_stack(list(demo.other_joints.values()))
+    if demo.commanded is not None:
+        arrays["commanded_poses"] = demo.commanded.vectors
+    return arrays
 
 
 def read_demonstration(path: str | Path) -> Demonstration:
     """Read a demonstration from an .npz file.
 
     Raises:
+        WrongType: no path.
         BadDemonstration: the file or one of its entries is invalid; the error names the entry.
     """
-    path = Path(path)
+    path = checked_file(path)
     arrays = read_arrays(path)
     missing = [key for key in REQUIRED if key not in arrays]
     if missing:
@@ -91,12 +115,12 @@ def read_demonstration(path: str | Path) -> Demonstration:
     version = arrays["format_version"]
     if version.shape != () or version.dtype.kind not in "iu" or int(version) != FORMAT_VERSION:
         raise BadDemonstration(path, "format_version", f"is {version.tolist()}; this program reads {FORMAT_VERSION}")
-    texts = {key: _text(path, key, arrays[key]) for key in TEXTS}
-    if texts.pop("units") != UNITS:
+    words = {key: text(path, key, arrays[key]) for key in TEXTS}
+    if words.pop("units") != UNITS:
         raise BadDemonstration(path, "units", f"must be {UNITS!r}; convert with: onedemo demo import")
     try:
         return Demonstration(
-            **texts,
+            **words,
             time=numbers(path, "time", arrays["time"], 1),
             path=PosePath.from_vectors(unit_poses(path, "poses", arrays["poses"])),
             joint_positions=numbers(path, "joint_positions", arrays["joint_positions"], 2)
@@ -105,6 +129,7 @@ def read_demonstration(path: str | Path) -> Demonstration:
             gripper=numbers(path, "gripper", arrays["gripper"], 1) if "gripper" in arrays else None,
             segments=_segments(path, arrays),
             object_sizes=_object_sizes(path, arrays),
+            **_scene(path, arrays),
         )
     except BadDemonstration as error:
         raise BadDemonstration(path, error.key, error.reason) from None
@@ -112,106 +137,8 @@ def read_demonstration(path: str | Path) -> Demonstration:
         raise BadDemonstration(path, "content", str(error).splitlines()[0]) from None
 
 
-def read_arrays(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]:
-    """Read all arrays of an .npz file after checking its headers: no objects, no duplicates, no zip bombs.
-
-    Args:
-        path: of the file.
-        max_bytes: largest total size of the expanded arrays [bytes].
-
-    Raises:
-        BadDemonstration: the file is missing, unreadable, too large or contains other entries than plain arrays.
-    """
-    if not path.is_file():
-        raise BadDemonstration(path, "file", "does not exist")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-            doubled = [name for name in names if names.count(name) > 1]
-            if doubled:
-                raise BadDemonstration(path, doubled[0], "stands in the file twice")
-            total = 0
-            for name in names:
-                if not name.endswith(".npy") or "/" in name or "\\" in name:
-                    raise BadDemonstration(path, name, "is not a plain array entry")
-                total += _announced_bytes(path, archive, name)
-            if total > max_bytes:
-                raise BadDemonstration(path, "file", f"expands to {total} bytes; at most {max_bytes} are read")
-        with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in data.files}
-    except UNREADABLE as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise BadDemonstration(path, "file", f"is not a readable .npz file ({reason})") from None
-
-
-def _announced_bytes(path: Path, archive: zipfile.ZipFile, name: str) -> int:
-    """Return the size of an entry [bytes] from its header alone."""
-    with archive.open(name) as file:
-        version = np.lib.format.read_magic(file)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(file)
-    if dtype.hasobject:
-        raise BadDemonstration(path, name.removesuffix(".npy"), "holds Python objects, which are never loaded")
-    announced = int(np.prod(shape, dtype=object)) * dtype.itemsize if shape else dtype.itemsize
-    return max(announced, archive.getinfo(name).file_size)
-
-
-def unit_poses(path: Path | str, key: str, value: np.ndarray) -> np.ndarray:
-    """Return pose vectors (n, 7) with normalized quaternions.
-
-    Args:
-        path: of the file, for messages.
-        key: of the array, for messages.
-        value: (n, 7): x y z [m], then quaternion wxyz, unit up to rounding.
-
-    Raises:
-        BadDemonstration: another shape, a number that is not finite, or a quaternion that is not unit.
-    """
-    poses = numbers(path, key, value, 2)
-    if poses.shape[1] != 7:
-        raise BadDemonstration(path, key, f"has shape {poses.shape}; expected (n, 7): x y z [m], quaternion wxyz")
-    norms = np.linalg.norm(poses[:, 3:], axis=1)
-    worst = int(np.abs(norms - 1.0).argmax()) if len(norms) else 0
-    if len(norms) and abs(norms[worst] - 1.0) > UNIT_QUATERNION:
-        raise BadDemonstration(path, key, f"the quaternion at index {worst} has norm {norms[worst]:.4g}; expected 1")
-    return np.concatenate([poses[:, :3], poses[:, 3:] / norms[:, None]], axis=1)
-
-
 def _is_text(value: Any) -> bool:
     return isinstance(value, str) or (isinstance(value, list) and all(isinstance(v, str) for v in value))
-
-
-def _text(path: Path, key: str, value: np.ndarray) -> str:
-    if value.shape != () or value.dtype.kind != "U":
-        raise BadDemonstration(path, key, "is not a text")
-    return str(value)
-
-
-def _texts(path: Path, key: str, value: np.ndarray) -> list[str]:
-    if value.ndim != 1 or value.dtype.kind != "U":
-        raise BadDemonstration(path, key, "is not a list of texts")
-    return [str(text) for text in value]
-
-
-def numbers(path: Path | str, key: str, value: np.ndarray, dimensions: int) -> np.ndarray:
-    """Return an array of finite real numbers as float64.
-
-    Args:
-        path: of the file, for messages.
-        key: of the array, for messages.
-        value: the array.
-        dimensions: required number of dimensions.
-
-    Raises:
-        BadDemonstration: anything else; the error names the file, the key and the index.
-    """
-    if value.dtype.kind not in "fiu" or value.ndim != dimensions:
-        raise BadDemonstration(path, key, f"is not an array of numbers with {dimensions} dimension(s)")
-    array = value.astype(np.float64)
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        raise BadDemonstration(path, key, f"is not finite at index {int(bad[0][0])}")
-    return array
 
 
 def _segments(path: Path, arrays: dict[str, np.ndarray]) -> tuple[Segment, ...]:
@@ -223,7 +150,7 @@ def _segments(path: Path, arrays: dict[str, np.ndarray]) -> tuple[Segment, ...]:
     if missing:
         raise BadDemonstration(path, missing[0], "is missing, although other segment entries are there")
     keys = ("segment_names", "segment_references", "segment_held", "segment_gripper")
-    names, references, held, gripper = (_texts(path, key, arrays[key]) for key in keys)
+    names, references, held, gripper = (texts(path, key, arrays[key]) for key in keys)
     ranges = arrays["segment_ranges"]
     if ranges.dtype.kind not in "iu" or ranges.ndim != 2 or ranges.shape[1] != 2:
         reason = f"is {ranges.dtype.name} of shape {ranges.shape}; expected whole numbers (segments, 2)"
@@ -246,10 +173,53 @@ def _segments(path: Path, arrays: dict[str, np.ndarray]) -> tuple[Segment, ...]:
     )
 
 
+def _scene(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Return the fields of what was recorded besides the arm."""
+    found: dict[str, Any] = {}
+    for key, names_key in (
+        ("object_paths", "object_path_names"),
+        ("fixture_poses", "fixture_names"),
+        ("other_joints", "other_joint_names"),
+    ):
+        if (key in arrays) != (names_key in arrays):
+            missing, there = (names_key, key) if key in arrays else (key, names_key)
+            raise BadDemonstration(path, missing, f"is missing, although {there} is there")
+    if "object_paths" in arrays:
+        names, poses = (
+            unique_names(path, "object_path_names", arrays),
+            numbers(path, "object_paths", arrays["object_paths"], 3),
+        )
+        _check_count(path, "object_paths", len(poses), names)
+        found["object_paths"] = {
+            name: PosePath.from_vectors(unit_poses(path, f"object_paths of {name!r}", rows))
+            for name, rows in zip(names, poses, strict=True)
+        }
+    if "fixture_poses" in arrays:
+        names, poses = (
+            unique_names(path, "fixture_names", arrays),
+            unit_poses(path, "fixture_poses", arrays["fixture_poses"]),
+        )
+        _check_count(path, "fixture_poses", len(poses), names)
+        found["fixtures"] = {name: Pose.from_vector(row) for name, row in zip(names, poses, strict=True)}
+    if "other_joints" in arrays:
+        names, values = (
+            unique_names(path, "other_joint_names", arrays),
+            numbers(path, "other_joints", arrays["other_joints"], 2),
+        )
+        _check_count(path, "other_joints", values.shape[1], names)
+        found["other_joints"] = dict(zip(names, values.T, strict=True))
+    if "commanded_poses" in arrays:
+        found["commanded"] = PosePath.from_vectors(unit_poses(path, "commanded_poses", arrays["commanded_poses"]))
+    return found
+
+
+def _check_count(path: Path, key: str, count: int, names: list[str]) -> None:
+    if count != len(names):
+        raise BadDemonstration(path, key, f"is for {count}; there are {len(names)} names: {', '.join(names)}")
+
+
 def _object_sizes(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    names = _texts(path, "object_names", arrays.get("object_names", np.empty(0, dtype=str)))
-    if len(set(names)) < len(names) or "" in names:
-        raise BadDemonstration(path, "object_names", f"are not unique names: {', '.join(map(repr, names))}")
+    names = unique_names(path, "object_names", arrays)
     sizes = numbers(path, "object_sizes", arrays.get("object_sizes", np.empty((0, 3))), 2)
     if sizes.shape != (len(names), 3):
         raise BadDemonstration(path, "object_sizes", f"has shape {sizes.shape}; expected ({len(names)}, 3)")

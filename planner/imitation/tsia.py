@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from ..arrays import checked_kind
 from ..errors import BadOption
 from ..geometry import dualquat as dq
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
@@ -44,7 +45,8 @@ def imitated_path(demonstrated: PosePath, goal: Pose) -> PosePath:
         demonstrated: the demonstrated path.
         goal: of the last pose, reached exactly.
     """
-    moved = demonstrated.moved(transfer_to(demonstrated, goal))
+    checked_kind("goal", goal, Pose)
+    moved = checked_kind("demonstrated", demonstrated, PosePath).moved(transfer_to(demonstrated, goal))
     # the product of d_n with its own inverse is 1 only up to rounding
     sign = 1.0 if moved.dqs[-1, :4] @ goal.dq[:4] >= 0 else -1.0
     return PosePath(np.concatenate([moved.dqs[:-1], sign * goal.dq[None]]))
@@ -64,7 +66,7 @@ def guide_index(path: PosePath, fraction: float = GUIDE_START, *, by: str = "len
     Paper: "20 % to 70 % of the length" without specifying the metric or the end it is measured from.
     """
     check_range("fraction", fraction, "[0, 1]")
-    last = len(path) - 1
+    last = len(checked_kind("path", path, PosePath)) - 1
     if by == "index":
         index = math.ceil(fraction * last)
     elif by == "length":
@@ -128,7 +130,8 @@ def final_path(start: Pose, imitated: PosePath, guide: int) -> PosePath:
     Raises:
         BadOption: there is no such pose.
     """
-    check_count("guide", guide, f"[0, {len(imitated) - 1}]")
+    checked_kind("start", start, Pose)
+    check_count("guide", guide, f"[0, {len(checked_kind('imitated', imitated, PosePath)) - 1}]")
     length = imitated.lengths()[-1]
     step = max(length / (len(imitated) - 1), LEAST_STEP) if length > STILL else BLEND_STEP
     blend = screw_path(start, imitated[guide], step)

@@ -14,8 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import checked_kind, checked_settings
+from ..errors import told_apart
 from ..log.motion_log import PROBLEM, MotionLog, content_of, digest_of
+from ..ranges import check_range
 from ..robot.body import BODY
+from ..robot.joint_limits import beyond_limit
 from .contacts import contact_excess
 from .deviation import deviation_of
 from .sweep import Sweep, Sweeper, SweepSettings
@@ -23,6 +27,8 @@ from .sweep import Sweep, Sweeper, SweepSettings
 FORMAT_VERSION = 1
 POSITION_ERROR, ANGLE_ERROR = 0.005, 0.05
 """Largest errors [m], [rad] of a reached goal; smaller claimed errors apply instead."""
+UNITS = {"clearance": "m", "position_error": "m", "angle_error": "rad", "joint_margin": "rad or m", "deviation": "m"}
+"""Units of the claims."""
 SPEED_EXCESS = 1e-6
 """Relative tolerance of joint speeds, for rounding."""
 CLAIM_GAP = 1e-5
@@ -93,13 +99,20 @@ def certify(
         log: the motion and its claims.
         expected: a log whose problem (arm, body, obstacles, allowed, goal, safety, and demonstrated if present) must
             equal the judged log's problem, whatever its own motion; None: any problem.
-        tolerance: [m], [rad] by which distances may be too small and claims too good.
+        tolerance: [m], [rad] by which distances may be too small, claims too good, and joints beyond a limit.
         settings: resolution of the examination between samples; default: `SweepSettings()`.
 
     Returns:
         The findings, in every case: a rejected motion is not an error.
+
+    Raises:
+        WrongType, BadOption: an argument is of a wrong class, or the tolerance is negative.
     """
-    settings, required = settings or SweepSettings(), _required(log)
+    checked_kind("log", log, MotionLog)
+    if expected is not None:
+        checked_kind("expected", expected, MotionLog)
+    check_range("tolerance", tolerance, "[0, inf)")
+    settings, required = checked_settings(SweepSettings, settings), _required(log)
     claimed = log.claims.get("clearance", -math.inf)
     sweeper = Sweeper(log, required - tolerance, claimed - 0.5 * CLAIM_GAP, settings)
     sweep = sweeper.run()
@@ -128,7 +141,7 @@ def certify(
     )
     reasons = (
         *_problem_reasons(log, expected),
-        *_motion_reasons(log, margins),
+        *_motion_reasons(log, margins, tolerance),
         *_clearance_reasons(log, sweep, required, tolerance),
         *_contact_reasons(log, contacts, excess, tolerance),
         *_goal_reasons(log, certificate, tolerance),
@@ -193,18 +206,20 @@ def _problem_reasons(log: MotionLog, expected: MotionLog | None) -> Iterator[str
             yield f"problem: {key} is not that of the expected problem"
 
 
-def _motion_reasons(log: MotionLog, margins: np.ndarray) -> Iterator[str]:
+def _motion_reasons(log: MotionLog, margins: np.ndarray, tolerance: float) -> Iterator[str]:
     late = np.flatnonzero(np.diff(log.time) <= 0)
     if len(late):
         k = late[0]
-        yield f"time: does not rise from {log.time[k]:g} s to {log.time[k + 1]:g} s at index {k + 1}"
+        first, second = told_apart(log.time[k], log.time[k + 1], 2)
+        yield f"time: does not rise from {first} s to {second} s at index {k + 1}"
     k, j = np.unravel_index(margins.argmin(), margins.shape)
-    if margins[k, j] < 0:
-        yield f"limits: {log.arm.joint_names[j]} is {-margins[k, j]:.3g} beyond its limit at index {k}"
+    if margins[k, j] < -tolerance:
+        yield f"limits: {beyond_limit(log.arm, log.joints[k])} at index {k}"
     ratios = _speed_ratios(log)
     if ratios.size and ratios.max() > 1.0 + SPEED_EXCESS:
         k, j = np.unravel_index(ratios.argmax(), ratios.shape)
-        yield f"speed: {log.arm.joint_names[j]} moves at {ratios[k, j]:.4g} times its limit after index {k}"
+        ratio, _ = told_apart(ratios[k, j], 1.0, 2)
+        yield f"speed: {log.arm.joint_names[j]} moves at {ratio} times its limit after index {k}"
 
 
 def _clearance_reasons(log: MotionLog, sweep: Sweep, required: np.ndarray, tolerance: float) -> Iterator[str]:
@@ -214,14 +229,13 @@ def _clearance_reasons(log: MotionLog, sweep: Sweep, required: np.ndarray, toler
     for name in dict.fromkeys(log.body.names):
         mine = np.array([name == other for other in log.body.names])
         for o in np.flatnonzero(short[mine].any(axis=0)):
-            k = np.flatnonzero(mine)[sweep.certified[mine, o].argmin()]
-            low, found = sweep.certified[k, o], sweep.sampled[k, o]
-            state = (
-                f"{found:.6g} m from" if found < required[k, o] - tolerance else f"not proven beyond {low:.6g} m from"
-            )
-            what = f"at least {-found:.4g} m inside" if found < 0 else state
+            k = np.flatnonzero(mine)[(sweep.certified[mine, o] - required[mine, o]).argmin()]
+            found, proven = sweep.sampled[k, o], sweep.sampled[k, o] < required[k, o] - tolerance
+            near, kept = told_apart(1e3 * (found if proven else sweep.certified[k, o]), 1e3 * required[k, o], 1)
+            state = f"{near} mm from" if proven else f"not proven beyond {near} mm from"
+            what = f"at least {-1e3 * found:.1f} mm inside" if found < 0 else state
             where = f"{log.obstacles[o].name or f'obstacle {o}'} at {sweep.when[k, o]:.4g} s"
-            yield f"clearance: {name} is {what} {where}; {required[k, o]:g} m must be kept"
+            yield f"clearance: {name} is {what} {where}; {kept} mm must be kept"
 
 
 def _contact_reasons(log: MotionLog, sweep: Sweep, excess: np.ndarray, tolerance: float) -> Iterator[str]:
@@ -230,34 +244,37 @@ def _contact_reasons(log: MotionLog, sweep: Sweep, excess: np.ndarray, tolerance
     for o in np.flatnonzero(excess > CONTACT_ROOM + tolerance):
         k = int(sweep.certified[:, o].argmin())
         where = f"{log.obstacles[o].name} at {sweep.when[k, o]:.4g} s"
-        yield (
-            f"contacts: {log.body.names[k]} is up to {excess[o]:.4g} m deeper in {where} than at the motion's ends; "
-            f"at most {CONTACT_ROOM:g} m"
-        )
+        deeper, most = told_apart(1e3 * excess[o], 1e3 * CONTACT_ROOM, 1)
+        name = log.body.names[k]
+        yield f"contacts: {name} is up to {deeper} mm deeper in {where} than at the motion's ends; at most {most} mm"
 
 
 def _goal_reasons(log: MotionLog, found: Certificate, tolerance: float) -> Iterator[str]:
     for key, unit, most in (("position_error", "m", POSITION_ERROR), ("angle_error", "rad", ANGLE_ERROR)):
         value = getattr(found, key)
         if value is not None and value > most + tolerance:
-            yield f"goal: {key} is {value:.6g} {unit}; at most {most:g}"
+            found_, allowed = told_apart(value, most, 3)
+            yield f"goal: {key} is {found_} {unit}; at most {allowed}"
 
 
 def _claim_reasons(log: MotionLog, found: Certificate, tolerance: float) -> Iterator[str]:
     for key, claimed in log.claims.items():
-        value = getattr(found, key)
+        value, what = getattr(found, key), "the truth"
         if value is None:
             yield f"claims.{key}: {claimed:.6g} is claimed, but the log holds nothing to compare with"
-        elif key == "clearance":
-            if claimed > found.sampled_clearance + tolerance:
-                yield f"claims.clearance: {claimed:.6g} m is claimed, {found.sampled_clearance:.6g} m is the truth"
-            elif claimed > value + CLAIM_GAP:
-                yield f"claims.clearance: {claimed:.6g} m is claimed, only {value:.6g} m is proven"
+            continue
+        if key == "clearance":
+            wrong = claimed > found.sampled_clearance + tolerance
+            what = what if wrong else "all that is proven"
+            value = found.sampled_clearance if wrong else value
+            wrong = wrong or claimed > value + CLAIM_GAP
         elif key == "joint_margin":
-            if claimed > value + tolerance:
-                yield f"claims.joint_margin: {claimed:.6g} is claimed, {value:.6g} is the truth"
-        elif claimed < value - tolerance - (found.deviation_gap if key == "deviation" else 0.0):
-            yield f"claims.{key}: {claimed:.6g} is claimed, {value:.6g} is the truth"
+            wrong = claimed > value + tolerance
+        else:
+            wrong = claimed < value - tolerance - (found.deviation_gap if key == "deviation" else 0.0)
+        if wrong:
+            one, other = told_apart(claimed, value, 4)
+            yield f"claims.{key}: {one} {UNITS[key]} is claimed, {other} is {what}"
 
 
 def _finite(value: object) -> object:

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..arrays import checked_array, frozen
+from ..arrays import checked_array, checked_file, checked_items, checked_kind, frozen
 from ..errors import BadShape, OneDemoError, WrongType
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
@@ -71,6 +71,7 @@ class MotionLog:
 
     Raises:
         BadLog: an entry has the wrong shape, is not finite or contains an unknown name.
+        WrongType: obstacles, allowed contacts or claims are of a wrong class.
     """
 
     arm: Arm
@@ -92,7 +93,7 @@ class MotionLog:
         for name, kind in kinds.items():
             if not isinstance(getattr(self, name), kind):
                 raise BadLog(None, name, f"is a {type(getattr(self, name)).__name__}")
-        for k, obstacle in enumerate(self.obstacles):
+        for k, obstacle in enumerate(checked_items("obstacles", self.obstacles, object)):
             if not isinstance(obstacle, Obstacle):
                 raise BadLog(None, f"obstacles[{k}]", f"is a {type(obstacle).__name__}, no obstacle")
         time = _checked("time", self.time, (None,))
@@ -107,11 +108,16 @@ class MotionLog:
             raise BadLog(None, "body.rows", f"a capsule moves with a joint beyond the {self.arm.dof} of the arm")
         if not 0.0 <= _number("safety", self.safety) <= FARTHEST:
             raise BadLog(None, "safety", f"{self.safety!r} is not a length from 0 on")
-        claims = {key: _number(f"claims.{key}", value) for key, value in self.claims.items()}
+        given = checked_kind("claims", self.claims, Mapping)
+        claims = {key: _number(f"claims.{key}", value) for key, value in given.items()}
         unknown = sorted(set(claims) - set(CLAIMS))
         if unknown:
             raise BadLog(None, f"claims.{unknown[0]}", f"is unknown; allowed: {', '.join(CLAIMS)}")
-        allowed = tuple(sorted({(str(mine), str(other)) for mine, other in self.allowed}))
+        pairs = checked_items("allowed", self.allowed, Sequence)
+        for k, pair in enumerate(pairs):
+            if isinstance(pair, str) or len(pair) != 2 or not all(isinstance(name, str) for name in pair):
+                raise BadLog(None, f"allowed[{k}]", "is not a pair of names")
+        allowed = tuple(sorted({(mine, other) for mine, other in pairs}))
         for mine, other in allowed:
             if mine not in self.body.names or not other or other not in [o.name for o in self.obstacles]:
                 raise BadLog(None, "allowed", f"{mine!r} with {other!r} is no part of the body with a named obstacle")
@@ -152,22 +158,27 @@ def write_log(log: MotionLog, path: str | Path) -> None:
         path: of the file, overwritten if present.
 
     Raises:
+        WrongType: no log, or no path.
         BadLog: the log is larger than `read_log` accepts.
     """
+    checked_kind("log", log, MotionLog)
+    path = checked_file(path)
     text = json.dumps({**content_of(log), "sha256": digest_of(log)}, allow_nan=False)
     if len(text) > MAX_BYTES:
         raise BadLog(path, "file", f"would hold {len(text)} bytes; at most {MAX_BYTES} are read")
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    path.write_text(text + "\n", encoding="utf-8")
 
 
 def read_log(path: str | Path) -> MotionLog:
     """Read a log; every entry is checked, then the digest.
 
     Raises:
+        WrongType: no path.
         BadLog: the file or one of its entries is invalid; the message names both.
     """
+    path = checked_file(path)
     try:
-        data = parsed(Path(path), MAX_BYTES)
+        data = parsed(path, MAX_BYTES)
         version = data.get("format_version") if isinstance(data, dict) else None
         if type(version) is not int or version != FORMAT_VERSION:
             raise Refused("format_version", f"is {version!r}; this program reads {FORMAT_VERSION}")

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import BadModel
+from ..errors import BadModel, told_apart
 from ..geometry.pose import Pose
 
 TURNS, SLIDES, OTHER = "turns", "slides", "other"
 """Kinds of joints; OTHER: free, planar and ball joints."""
-ROUNDING = 1e-9
-"""Excess over a limit [rad or m] that is rounding."""
+ROUNDING = 1e-6
+"""Excess over a limit [rad or m] that is rounding: such a joint is taken for one at the limit."""
 
 
 class ModelJoint(NamedTuple):
@@ -150,8 +150,10 @@ def _allowed(joint: ModelJoint, value: float, source: str) -> float:
     if joint.kind == OTHER and position != joint.rest:
         raise BadModel(source, key, f"{position:g}: a free, planar or ball joint stays where the model has it: 0")
     if not joint.low - ROUNDING <= position <= joint.high + ROUNDING:
-        raise BadModel(source, key, f"{position:g} is beyond its limits {joint.low:g} to {joint.high:g}")
-    return position
+        side, limit = ("upper", joint.high) if position > joint.high else ("lower", joint.low)
+        at, end = told_apart(position, limit, 1)
+        raise BadModel(source, key, f"{at} is beyond its {side} limit {end}")
+    return min(max(position, joint.low), joint.high)
 
 
 def check_independent(chain: Iterable[str], couplings: Iterable[Coupling], held: Mapping[str, float], source: str):

@@ -1,13 +1,22 @@
-"""Closed loops that a plan may try, the likeliest first."""
+"""Closed loops that a plan may try, the likeliest first, and why one failed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..escape.detour import ESCAPED, FREE
-from ..escape.repet import Corner
+import numpy as np
+
+from ..control.reachability import gap
+from ..escape.detour import ESCAPED, FREE, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION, TOO_LONG
+from ..escape.repet import Corner, RepetSettings
+from ..geometry.pose import Pose
+from ..robot.arm import Arm
+from .planning_scene import PlanningScene
 from .settings import PlanSettings
+
+NOTHING_KEPT = "nothing of the demonstration is kept"
+"""Reason of a plan that would join the demonstrated path only at its end though some of it must be kept."""
 
 
 class Attempt(NamedTuple):
@@ -49,3 +58,32 @@ def attempts(settings: PlanSettings, escapes: list[int]) -> Iterator[Attempt]:
     if escapes[-1] == ESCAPED:
         for bias in settings.biases[1:]:
             yield Attempt(guide, bias, settings.tight)
+
+
+def escape_detail(
+    status: int, arm: Arm, scene: PlanningScene, goal: Pose, joints: np.ndarray, factor: float, rows: int,
+    repet: RepetSettings,
+) -> str:  # fmt: skip
+    """Return why a path was not followed to its end.
+
+    Args:
+        status: of its escape, see `escape.detour`.
+        arm: the arm.
+        scene: the arm among obstacles.
+        goal: pose of the tcp at the end.
+        joints: (t, dof) of the motion so far.
+        factor: of the planning margin.
+        rows: number of nodes of the last escape tree.
+        repet: settings of the escape trees.
+    """
+    if status == START_IN_COLLISION:
+        return str(scene.tightest_of_tool(arm.fk(joints[0]), factor))
+    if status == GOAL_IN_COLLISION:
+        return str(scene.tightest_of_tool(goal, factor))
+    if status == NODE_LIMIT:
+        return f"a tree had {repet.nodes} nodes, see repet.nodes"
+    if status == TOO_LONG:
+        return f"blend and detours would have more than {repet.longest} poses, see repet.longest"
+    if status == NO_ESCAPE:
+        return f"{rows} nodes in the last of {repet.retries + 1} trees"
+    return f"the arm comes to a stop {gap(arm, goal, joints[-1])}"

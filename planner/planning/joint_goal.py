@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import numbers
-from ..errors import BadShape, NotFinite, told_apart
+from ..errors import BadShape, NotFinite
 from ..robot.arm import Arm
-from ..robot.kinematics import CHAIN, FRAME, PRISMATIC, forward_into
+from ..robot.kinematics import FRAME, forward_into
 from .joint_space_motion import timed_on_lines
 from .joint_space_rrt import connect, joint_edge_is_clear, shortcut
 from .planning_scene import PlanningScene
@@ -44,20 +44,6 @@ def checked_goal(arm: Arm, goal: ArrayLike) -> np.ndarray:
     if not np.isfinite(q).all():
         raise NotFinite(f"{arm.name}: goal", int(np.argmin(np.isfinite(q))))
     return q
-
-
-def beyond_limit(arm: Arm, q: np.ndarray) -> str:
-    """Return the joint that is farthest beyond its limits, in words; "" if none is.
-
-    Args:
-        arm: the arm.
-        q: (dof,) joints.
-    """
-    margins = np.minimum(q - arm.lower, arm.upper - q)
-    joint = int(np.argmin(margins))
-    unit = "m" if arm.chain[joint, CHAIN.kind] == PRISMATIC else "rad"
-    excess, _ = told_apart(-margins[joint], 0.0, 3)
-    return f"{arm.joint_names[joint]} by {excess} {unit}" if margins[joint] < 0.0 else ""
 
 
 def line_to(

@@ -138,6 +138,8 @@ def plan_joint_space(
     settings: PlanSettings,
     check: NextMotionCheck | None,
     seed: int,
+    *,
+    must_keep: bool = False,
 ) -> JointSpaceMotion | SearchFailure:
     """Search a path in joint space to the goal, imitating the end of the demonstration.
 
@@ -151,6 +153,7 @@ def plan_joint_space(
         settings: see `PlanSettings`.
         check: check of the next motion; None: there is none.
         seed: of all random choices.
+        must_keep: the imitated path is not joined at its last pose.
 
     Returns:
         The motion, or why the last round found none.
@@ -166,7 +169,7 @@ def plan_joint_space(
         later = search.rounds - 1 - turn
         iterations = max(search.iterations // ROUND_SHRINK**later, min(MIN_ITERATIONS, search.iterations))
         found, failure = _postures(
-            arm, scene, work, demonstrated, goal, q, settings, check, rng, search.seeds * 2**turn
+            arm, scene, work, demonstrated, goal, q, settings, check, rng, search.seeds * 2**turn, must_keep
         )
         best, least = None, math.inf
         for posture in sorted(found)[: search.postures]:
@@ -197,7 +200,7 @@ def _length(points: np.ndarray) -> float:
 
 
 def _postures(
-    arm, scene, work, demonstrated, goal, q, settings, check, rng, seeds
+    arm, scene, work, demonstrated, goal, q, settings, check, rng, seeds, must_keep
 ) -> tuple[list[_Posture], SearchFailure]:
     """Return clear postures on the imitated path from which the rest of it can be followed, with their costs.
 
@@ -207,7 +210,8 @@ def _postures(
     imitated = imitated_path(demonstrated, goal)
     first, last = guide_index(imitated, settings.motion.guide), len(imitated) - 1
     home, (low, high) = np.clip(q, arm.lower, arm.upper), sample_ranges(arm.lower, arm.upper, q)
-    for index in sorted({round(i) for i in np.linspace(first, last, search.targets)}):
+    indices = {round(i) for i in np.linspace(first, last, search.targets)}
+    for index in sorted((indices - {last} or indices) if must_keep else indices):
         path = imitated[index:]
         near = inverse_kinematics(arm, path[0], home, iterations=150)
         for k in range(seeds):

@@ -14,9 +14,10 @@ search in joint space was the last to fail, the reason is the search's.
 | no escape found | no escape tree saw the path again | number of nodes |
 | node limit reached | an escape tree stopped at `RepetSettings.nodes`: more nodes may help | the limit |
 | the detours do not fit into the longest path allowed | see `RepetSettings.longest` | the limit |
-| ik_or_limit | the arm does not follow any path of the tool to its end | how far it reaches, or comes |
+| ik_or_limit | the goal is out of reach, or the arm follows no path to it | how far it reaches, or what limits it |
 | no clear posture | all postures that a search in joint space found are in collision | part, obstacle, distance |
 | no path in joint space | a search in joint space found postures, but no path | number of postures |
+| nothing of the demonstration is kept | though the request asks for it, see `PlanRequest.must_keep` | the way found |
 | an allowed contact is deeper on the way | than at the motion's ends, by more than 5 mm | |
 | no path to the goal joints | neither the tool's path nor a search in joint space leads there | number of searches |
 """
@@ -80,6 +81,8 @@ class PlanRequest(NamedTuple):
         leaving: path of the tcp from its pose at `start` on, by which the start is left; None: blend at once.
         next_motion: the motion that follows, if it is known.
         seed: of all random choices; the same seed gives the same plan.
+        must_keep: a plan that keeps nothing of the demonstrated path behind the guiding pose is a failure: how things
+            are moved matters, not only where they end.
     """
 
     demonstrated: PosePath
@@ -90,6 +93,7 @@ class PlanRequest(NamedTuple):
     leaving: PosePath | None = None
     next_motion: NextMotion | None = None
     seed: int = 0
+    must_keep: bool = False
 
 
 def pose_goal(request: PlanRequest) -> Pose:
@@ -160,6 +164,11 @@ class Plan(NamedTuple):
     def success(self) -> bool:
         """True if the plan arrives and every step of it is proven clear."""
         return not self.reason
+
+    @property
+    def keeps(self) -> bool:
+        """True unless nothing of the demonstrated path is kept though some of it must be."""
+        return not self.request.must_keep or self.imitated_share > 0.0
 
     @property
     def why(self) -> str:
@@ -255,6 +264,7 @@ class MotionPlanner(ABC):
         leaving: PosePath | None = None,
         next_motion: NextMotion | None = None,
         seed: int = 0,
+        must_keep: bool = False,
     ) -> Plan:
         """Plan a motion.
 
@@ -268,6 +278,7 @@ class MotionPlanner(ABC):
             leaving: path of the tcp from its pose at `start` on, by which the start is left; None: blend at once.
             next_motion: the motion that follows, if it is known.
             seed: of all random choices; the same seed gives the same plan.
+            must_keep: a plan that keeps nothing of the demonstration is a failure; see `PlanRequest.must_keep`.
 
         Returns:
             The plan; if it failed, its `reason` says why.
@@ -280,7 +291,8 @@ class MotionPlanner(ABC):
         """
         path = segment_of(demonstrated, segment)
         around, contacts = checked_items("obstacles", obstacles, Obstacle), checked_contacts(allowed)
-        return self.answer(PlanRequest(path, start, goal, around, contacts, leaving, next_motion, seed))
+        request = PlanRequest(path, start, goal, around, contacts, leaving, next_motion, seed, must_keep)
+        return self.answer(request)
 
 
 def segment_of(demonstrated: Demonstration | PosePath, segment: str | None = None) -> PosePath:

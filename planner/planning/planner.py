@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import checked_kind
+from ..arrays import checked_kind, checked_settings
 from ..control.arm_arrays import arm_arrays
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..control.reachability import why_not_reached
-from ..escape.detour import ESCAPED, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION, TOO_LONG
+from ..escape.detour import ESCAPED
 from ..escape.repet import Corner
 from ..escape.tree_arrays import OPTION
 from ..geometry.pose import Pose
@@ -28,7 +28,7 @@ from ..ranges import ticks_of
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..robot.kinematics import FRAME, forward_into
-from .attempts import Attempt, attempts
+from .attempts import NOTHING_KEPT, Attempt, attempts, escape_detail
 from .closed_loop_motion import COUNT, Buffers, buffers, plan_closed_loop
 from .joint_goal import line_to, plan_to_joints, tool_path
 from .joint_space_motion import (
@@ -65,7 +65,7 @@ class Planner(MotionPlanner):
     """
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings | None = None):
-        self.arm, self.settings = checked_kind("arm", arm, Arm), settings or PlanSettings()
+        self.arm, self.settings = checked_kind("arm", arm, Arm), checked_settings(PlanSettings, settings)
         self.hold(body)
         motion = self.settings.motion
         self._work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
@@ -112,10 +112,12 @@ class Planner(MotionPlanner):
         if not isinstance(to, Pose):
             return self._to_joints(run, np.asarray(to), lead)._replace(tries=1)
         best, tries = self._followed(run, lead, request.seed)
-        if not best.success or best.end_margin < self.settings.end_margin or not best.next_feasible:
+        if not (best.success and best.next_feasible and best.end_margin >= self.settings.end_margin and best.keeps):
             best = self._searched(run, best, request.seed)
+        if best.success and not best.keeps:
+            best = self._failed(run, NOTHING_KEPT, f"found was: {best.how}", tried=True)
         if best.reason == IK_OR_LIMIT and not best.detail:
-            best = best._replace(detail=why_not_reached(self.arm, pose, q, search=self.settings.search is not None))
+            best = best._replace(detail=why_not_reached(self.arm, pose, q))
         return best._replace(tries=tries)
 
     def _make_room(self, given: int) -> None:
@@ -148,8 +150,11 @@ class Planner(MotionPlanner):
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
             elif failed is None:
-                why = WHY.get(status, "") or IK_OR_LIMIT, self._detail(run, status, attempt.factor)
-                failed = (DEEP_CONTACT, "") if arrived else why
+                rows, repet = int(self._buffers.counts[COUNT.tree_rows]), self.settings.repet
+                why = "the safety layer leads the tool off the path"
+                if pursuit != ARRIVED:
+                    why = escape_detail(status, self.arm, run.scene, run.goal, trace, attempt.factor, rows, repet)
+                failed = (DEEP_CONTACT, "") if arrived else (WHY.get(status, "") or IK_OR_LIMIT, why)
         if best is None:
             assert failed is not None
             best = self._failed(run, *failed, tried=True)
@@ -158,9 +163,9 @@ class Planner(MotionPlanner):
     def _searched(self, run: _Run, best: Plan, seed: int) -> Plan:
         """Return the better of the given plan and a joint-space plan; without either, why the search failed."""
         settings = self.settings
-        if settings.search is None or not settings.avoid or (best.success and settings.effort == 0):
+        if settings.search is None or not settings.avoid or (best.success and best.keeps and settings.effort == 0):
             return best
-        if best.success and best.next_feasible:
+        if best.success and best.next_feasible and best.keeps:
             rounds = min(settings.search.rounds, settings.effort)
             settings = replace(settings, search=replace(settings.search, rounds=rounds))
         found = plan_joint_space(
@@ -173,6 +178,7 @@ class Planner(MotionPlanner):
             settings,
             run.check,
             seed,
+            must_keep=run.request.must_keep,
         )
         if isinstance(found, SearchFailure):
             return best if best.success else best._replace(reason=found.reason, detail=found.detail)
@@ -253,19 +259,6 @@ class Planner(MotionPlanner):
         out = np.empty(8)
         forward_into(self.arm.chain, q, np.empty((self.arm.dof, FRAME.width)), out)
         return out
-
-    def _detail(self, run: _Run, status: int, factor: float) -> str:
-        """The facts of an escape that failed."""
-        rows, repet = int(self._buffers.counts[COUNT.tree_rows]), self.settings.repet
-        if status == START_IN_COLLISION:
-            return str(run.scene.tightest_of_tool(Pose(self._pose(run.q)), factor))
-        if status == GOAL_IN_COLLISION:
-            return str(run.scene.tightest_of_tool(run.goal, factor))
-        if status == NODE_LIMIT:
-            return f"a tree had {repet.nodes} nodes, see repet.nodes"
-        if status == TOO_LONG:
-            return f"blend and detours would have more than {repet.longest} poses, see repet.longest"
-        return f"{rows} nodes in the last of {repet.retries + 1} trees" if status == NO_ESCAPE else ""
 
     def _closed_loop(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
         b, motion, repet = self._buffers, self.settings.motion, self.settings.repet

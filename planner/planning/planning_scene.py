@@ -66,13 +66,18 @@ class Tightest(NamedTuple):
     distance: float
     margin: float
 
+    @property
+    def slack(self) -> float:
+        """Distance beyond the required one [m]."""
+        return self.distance - self.margin
+
     def __str__(self) -> str:
         """The pair in words, for messages."""
         if self.distance <= 0.0:
             return f"{self.part} touches {self.other}"
         distance, margin = told_apart(1e3 * self.distance, 1e3 * self.margin, 1)
-        if self.distance >= self.margin:
-            return f"{self.part} is {distance} mm from {self.other}, no less than the {margin} that it must be"
+        if self.slack >= 0.0:
+            return f"{self.part} is {distance} mm from {self.other}, and {margin} are enough"
         return f"{self.part} is {distance} mm from {self.other}, which must be {margin}"
 
 

@@ -7,19 +7,20 @@ import math
 import numpy as np
 
 from ..arrays import checked_kind
-from ..errors import BadOption
+from ..control.reachability import why_not_reached
+from ..errors import BadOption, told_apart
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
 from ..imitation.reduction import reduced
 from ..ranges import check_count
 from ..robot.arm import Arm
+from ..robot.joint_limits import beyond_limit, within_limits
 from ..safety.robot_checks import checked_contacts
-from .joint_goal import beyond_limit, checked_goal
+from .joint_goal import checked_goal
+from .joint_space_motion import IK_OR_LIMIT
 from .plan import NextMotion, PlanRequest
 from .planning_scene import PlanningScene, checked_obstacles
 from .settings import PlanSettings
 
-ROUNDING = 1e-6
-"""How far [rad or m] a start may be beyond a joint limit to be taken for one at the limit."""
 LEAVING_TOLERANCE = 0.01
 """Largest weighted distance [m] from the tool at the start to the beginning of the path by which the start is left."""
 
@@ -27,7 +28,7 @@ LEAVING_TOLERANCE = 0.01
 def checked_request(request: PlanRequest, arm: Arm) -> PlanRequest:
     """Return a request that can be planned: its start, and a goal of joints, as arrays of their own, its seed an int.
 
-    Joints that are beyond a limit by no more than `ROUNDING` are at the limit.
+    Joints that are beyond a limit by rounding are at the limit, see `within_limits`. Allowed contacts become tuples.
 
     Args:
         request: the request.
@@ -43,19 +44,24 @@ def checked_request(request: PlanRequest, arm: Arm) -> PlanRequest:
     checked_kind("demonstrated", request.demonstrated, PosePath)
     goal = request.goal
     if not isinstance(goal, Pose):
-        goal = _within_limits(arm, checked_goal(arm, goal))
+        goal = within_limits(arm, checked_goal(arm, goal))
     check_count("seed", request.seed, "(-inf, inf)")
     then = request.next_motion
     if then is not None:
         checked_kind("next_motion", then, NextMotion)
         checked_kind("next_motion.path", then.path, PosePath)
         then = then._replace(allowed=checked_contacts(then.allowed, "next_motion.allowed"))
-    start = _within_limits(arm, arm.checked(request.start))
+    start = within_limits(arm, arm.checked(request.start))
     if request.leaving is not None:
         _check_leaving(arm, start, checked_kind("leaving", request.leaving, PosePath))
-    obstacles = checked_obstacles(request.obstacles)
-    seed = int(request.seed)  # numpy's small whole numbers overflow where Python's do not
-    return request._replace(start=start, goal=goal, obstacles=obstacles, next_motion=then, seed=seed)
+    return request._replace(
+        start=start,
+        goal=goal,
+        obstacles=checked_obstacles(request.obstacles),
+        allowed=checked_contacts(request.allowed),
+        next_motion=then,
+        seed=int(request.seed),  # numpy's small whole numbers overflow where Python's do not
+    )
 
 
 def reduced_request(request: PlanRequest, most: int) -> tuple[PlanRequest, float]:
@@ -99,22 +105,21 @@ def unfit(arm: Arm, scene: PlanningScene, request: PlanRequest, settings: PlanSe
             return "goal beyond a joint limit", beyond
         if careful and scene.slack(np.asarray(goal)) < 0.0:
             return "goal in collision", str(scene.tightest(np.asarray(goal)))
-    elif careful and scene.tool_slack(goal) < 0.0:
+        return "", ""
+    if far := why_not_reached(arm, goal, start, search=False):
+        return IK_OR_LIMIT, far
+    if careful and scene.tool_slack(goal) < 0.0:
         return "goal in collision", str(scene.tightest_of_tool(goal))
     return "", ""
 
 
-def _within_limits(arm: Arm, q: np.ndarray) -> np.ndarray:
-    """Return joints (dof,) as a new array; what is beyond a limit by rounding is at the limit."""
-    nearest = np.clip(q, arm.lower, arm.upper)
-    return np.where(np.abs(q - nearest) <= ROUNDING, nearest, q)
-
-
 def _check_leaving(arm: Arm, start: np.ndarray, leaving: PosePath) -> None:
     distance, angle = arm.fk(start).distance_to(leaving[0])
-    if not math.hypot(distance, METERS_PER_RADIAN * angle) <= LEAVING_TOLERANCE:
+    away = math.hypot(distance, METERS_PER_RADIAN * angle)
+    if not away <= LEAVING_TOLERANCE:
+        found, most = told_apart(1e3 * away, 1e3 * LEAVING_TOLERANCE, 1)
         reason = (
-            f"begins {1e3 * distance:.1f} mm and {math.degrees(angle):.1f} degrees from the tool at the start; "
-            f"allowed are {1e3 * LEAVING_TOLERANCE:g} mm or {math.degrees(LEAVING_TOLERANCE / METERS_PER_RADIAN):.1f}"
+            f"begins {1e3 * distance:.1f} mm and {math.degrees(angle):.1f} degrees from the tool at the start: "
+            f"{found} mm, a radian counted as {METERS_PER_RADIAN:g} m; allowed are {most}"
         )
         raise BadOption("leaving", reason)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ..arrays import checked_array, numbers
+from ..arrays import checked_array, checked_kind, numbers
 from ..control.controller import ControllerSettings
 from ..control.pursuit import PursuitSettings
 from ..errors import BadOption
@@ -35,6 +35,8 @@ class MotionSettings:
     dt: float = 0.02
 
     def __post_init__(self):
+        checked_kind("controller", self.controller, ControllerSettings)
+        checked_kind("pursuit", self.pursuit, PursuitSettings)
         check_ranges(self, "[0, 1]", "guide", "max_guide")
         check_ranges(self, "(0, inf)", "dt")
         if self.guide > self.max_guide:
@@ -128,6 +130,11 @@ class PlanSettings:
     guard: bool = True
 
     def __post_init__(self):
+        checked_kind("motion", self.motion, MotionSettings)
+        checked_kind("repet", self.repet, RepetSettings)
+        checked_kind("safety", self.safety, SafetySettings)
+        if self.search is not None:
+            checked_kind("search", self.search, JointSearchSettings)
         check_ranges(self, "(0, 1]", "tight")
         check_ranges(self, "[0, 1]", "min_imitated_share")
         check_ranges(self, "[0, inf]", "end_margin")

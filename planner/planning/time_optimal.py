@@ -13,13 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from toppra import SplineInterpolator
-from toppra.algorithm import TOPPRA
-from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
-from ..arrays import checked_array, frozen, numbers
+from ..arrays import FrozenArrays, checked_array, frozen, numbers
+from ..deferred_imports import deferred
 from ..errors import BadOption, BadShape, PlanFailed
 from ..ranges import check_range
+
+with deferred("matplotlib", "matplotlib.pyplot"):
+    from toppra import SplineInterpolator
+    from toppra.algorithm import TOPPRA
+    from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
 REPEAT = 1e-8
 """Share of the whole path up to which a step counts as none: its ends are one waypoint."""
@@ -35,7 +38,7 @@ MAX_SAMPLES = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TimedPath:
+class TimedPath(FrozenArrays):
     """A joint path with its timing, sampled evenly, from rest to rest.
 
     Attributes:

@@ -17,8 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import checked_kind
 from ..errors import BadOption
 from ..escape.detour import GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT, START_IN_COLLISION
+from ..planning.attempts import NOTHING_KEPT
 from ..planning.joint_space_motion import DEEP_CONTACT, NO_CLEAR_POSTURE, NO_JOINT_PATH
 from ..planning.plan import WHY
 from ..planning.settings import PlanSettings
@@ -29,9 +31,9 @@ FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
 )  # fmt: skip
 BLOCKING = (
     *(WHY[status] for status in (START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT)),
-    "start in collision", "goal in collision", NO_CLEAR_POSTURE, NO_JOINT_PATH, DEEP_CONTACT,
+    "start in collision", "goal in collision", NO_CLEAR_POSTURE, NO_JOINT_PATH, DEEP_CONTACT, NOTHING_KEPT,
 )  # fmt: skip
-"""Reasons of a failed plan that mean: an obstacle is in the way."""
+"""Reasons of a failed plan that mean: an obstacle is in the way of the motion as demonstrated."""
 STATES = (FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED)
 
 
@@ -54,6 +56,7 @@ class ReactiveSettings:
     lead: float = 0.05
 
     def __post_init__(self):
+        checked_kind("plan", self.plan, PlanSettings)
         check_ranges(self, "[0, 60)", "horizon", "lead")
         check_ranges(self, "(0, inf)", "patience", "give_up")
         if self.patience > self.give_up:

@@ -20,7 +20,10 @@ import numpy as np
 
 from ..control.pursuit import PursuitSettings, fresh_pursuit_state
 from ..geometry.pose import PosePath
+from ..planning.attempts import NOTHING_KEPT
 from ..planning.plan import NextMotion
+from ..planning.planning_scene import Tightest
+from .command import BLOCKING
 
 DECIDE = 0.2
 """Seconds for which a decision to go on, to wait or to go round holds."""
@@ -48,6 +51,7 @@ class MotionState:
         nominal: the path that was asked for.
         detours: False: along the path or not at all.
         next_motion: the motion that follows, if it is known.
+        must_keep: new plans must keep some of the path, see `PlanRequest.must_keep`.
         plan_now: the next tick plans round the standing obstacles.
         mode: see the module.
         path: the path that is followed: (a part of) the nominal one, or a detour.
@@ -68,6 +72,7 @@ class MotionState:
     nominal: PosePath
     detours: bool = True
     next_motion: NextMotion | None = None
+    must_keep: bool = False
     plan_now: bool = False
     mode: Mode = Mode.PURSUING
     path: PosePath = field(init=False)
@@ -138,3 +143,19 @@ def pursuit_of(settings: PursuitSettings, *, exact: bool) -> PursuitSettings:
         radius = settings.capture_radius
         settings = replace(settings, position_tolerance=radius, angle_tolerance=5.0 * radius)
     return replace(settings, patience=1e9)
+
+
+def why_stalled(motion: MotionState, tight: Tightest | None, distance: float) -> tuple[str, str]:
+    """Return reason and detail of a motion without progress.
+
+    Args:
+        motion: the motion.
+        tight: the tightest pair of parts and obstacles; None: nothing is near.
+        distance: slack [m] of this pair below which it blocks the motion.
+    """
+    reason, detail = motion.refusal
+    if reason == NOTHING_KEPT:
+        return "blocked", f"{reason}: {detail}"
+    if tight is not None and tight.slack < distance:
+        return "blocked", str(tight) if tight.slack < 0.0 else f"no progress beside it: {tight}"
+    return ("blocked" if reason in BLOCKING else "ik_or_limit"), detail

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import checked_kind
+from ..arrays import checked_kind, checked_settings
 from ..collision.step_certificates import near_pair_slack
 from ..control.arm_arrays import ARM, PURSUIT_STATE, arm_arrays
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
@@ -32,8 +32,8 @@ from ..safety.guarded_pursuit import guarded_tick
 from ..safety.robot_checks import checked_contacts
 from ..safety.safety_layer import BLOCKED as UNSAFE
 from ..safety.safety_layer import FREE, safe_velocity
-from .command import BLOCKED, BLOCKING, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
-from .motion_state import DECIDE, HELD_BACK, WAITS, Mode, MotionState, pursuit_of
+from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
+from .motion_state import DECIDE, HELD_BACK, WAITS, Mode, MotionState, pursuit_of, why_stalled
 from .prediction import Predictor, is_preferable, same_scene, swept, windows
 
 
@@ -53,7 +53,7 @@ class ReactivePlanner:
     """
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings | None = None):
-        self.arm, self.settings = checked_kind("arm", arm, Arm), settings or ReactiveSettings()
+        self.arm, self.settings = checked_kind("arm", arm, Arm), checked_settings(ReactiveSettings, settings)
         plan = self.settings.plan
         # a path to follow is already imitated: it is joined as early as possible
         early = replace(plan, motion=replace(plan.motion, guide=0.0, max_guide=0.3))
@@ -100,7 +100,13 @@ class ReactivePlanner:
             self._scene.move(self._ahead())
 
     def go(
-        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True
+        self,
+        path: PosePath,
+        *,
+        exact: bool = True,
+        next_motion: NextMotion | None = None,
+        detours: bool = True,
+        must_keep: bool = False,
     ) -> None:
         """Follow a path to its end, joined from wherever the arm is.
 
@@ -110,6 +116,7 @@ class ReactivePlanner:
             next_motion: the motion that follows: where there is a choice, the path ends in a posture that suits it.
             detours: False: along the path or not at all, without detour or search; where the safety layer leads away
                 from the path, the arm stands still, if it can.
+            must_keep: new plans must keep some of the path, see `PlanRequest.must_keep`.
         """
         checked_kind("path", path, PosePath)
         if next_motion is not None:
@@ -117,7 +124,8 @@ class ReactivePlanner:
         path = reduced(path, max(self.settings.plan.repet.longest, 2)).path
         packed = pursuit_of(self.settings.plan.motion.pursuit, exact=exact).packed()
         self._work[ARM.pursuit, : len(packed)] = packed
-        self.motion = MotionState(path, detours, next_motion, plan_now=bool(self._obstacles) and detours)
+        plan_now = bool(self._obstacles) and detours
+        self.motion = MotionState(path, detours, next_motion, must_keep, plan_now=plan_now)
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """Follow the path of a plan to its end.
@@ -271,21 +279,14 @@ class ReactivePlanner:
             hopeless = (not self._moving or not motion.detours) and motion.tries >= 3
             hopeless |= not self._moving and motion.refusal[0] == "goal in collision"
             if hopeless or motion.stalled > self.settings.give_up:
-                motion.fail(*self._why(motion))
+                tight, distance = self._scene.tightest_seen(), self.settings.plan.safety.distance
+                motion.fail(*why_stalled(motion, tight, distance))
                 return self._stand_still(q)
             motion.tries += 1
             motion.pursuit[PURSUIT_STATE.waited] = 0.0
             if motion.detours:
                 self._replan(q, self._obstacles)
         return command
-
-    def _why(self, motion: MotionState) -> tuple[str, str]:
-        """Reason and detail of a motion without progress."""
-        tight = self._scene.tightest_seen()
-        if tight is not None and tight.distance - tight.margin < self.settings.plan.safety.distance:
-            return "blocked", str(tight)
-        reason, detail = motion.refusal
-        return ("blocked", detail) if reason in BLOCKING else ("ik_or_limit", "")
 
     def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
         """Lead the rest of the motion round obstacles taken to stand still; where that fails, the path stays."""
@@ -295,8 +296,9 @@ class ReactivePlanner:
         motion.reached = self._now_at(motion, q)
         rest = motion.nominal[motion.reached :]
         allowed = self._known_allowed(obstacles)
+        then, keep = motion.next_motion, motion.must_keep
         plan = self._planner.plan(
-            rest, q, rest[-1], obstacles, allowed=allowed, next_motion=motion.next_motion, seed=motion.tries
+            rest, q, rest[-1], obstacles, allowed=allowed, next_motion=then, seed=motion.tries, must_keep=keep
         )
         motion.refusal = plan.reason, plan.detail
         if plan.success and plan.how == "joint search":

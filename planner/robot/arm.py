@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import checked_array, checked_kind, frozen, is_fit, numbers
+from ..arrays import FrozenArrays, checked_array, checked_items, checked_kind, frozen, is_fit, numbers
 from ..errors import BadModel, BadShape
 from ..geometry.pose import Pose
 from ..models.model_report import ModelReport
@@ -21,7 +21,7 @@ MAX_DOF = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arm:
+class Arm(FrozenArrays):
     """A serial chain from the world to a tool frame.
 
     Attributes:
@@ -47,6 +47,7 @@ class Arm:
     report: ModelReport = field(default_factory=ModelReport)
 
     def __post_init__(self):
+        object.__setattr__(self, "joint_names", checked_items(f"{self.name}: joint_names", self.joint_names, str))
         dof = len(self.joint_names)
         if not 1 <= dof <= MAX_DOF:
             raise BadModel(self.name, "joints", f"has {dof}; allowed are 1 to {MAX_DOF}")

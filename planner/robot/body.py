@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import checked_array, checked_kind, frozen, numbers
-from ..errors import BadModel, BadOption, BadShape, UnknownName
+from ..arrays import FrozenArrays, checked_array, checked_items, checked_kind, frozen, numbers
+from ..errors import BadModel, BadOption, BadShape, UnknownName, WrongType
 from ..geometry.capsule_cover import covering_capsules
 from ..geometry.pose import Pose
 from ..geometry.shapes import MAX_VERTICES, Shape
@@ -59,7 +59,7 @@ class Hull(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Body:
+class Body(FrozenArrays):
     """Capsules that contain an arm's links, each moving with the frame of one joint (see `kinematics`).
 
     Attributes:
@@ -88,6 +88,7 @@ class Body:
 
     def __post_init__(self):
         rows = frozen(numbers("body: rows", self.rows))
+        object.__setattr__(self, "names", checked_items("body: names", self.names, str))
         if rows.ndim != 2 or rows.shape != (len(self.names), BODY.width):
             raise BadShape("body: rows", rows.shape, f"({len(self.names)}, {BODY.width})")
         if len(rows) > MAX_CAPSULES:
@@ -145,8 +146,14 @@ class Body:
             arm: the arm this body belongs to.
 
         Raises:
+            WrongType: an argument is of a wrong class.
             UnknownName: the name is in use.
         """
+        checked_kind("name", name, str)
+        if not isinstance(shape, Shape):
+            raise WrongType("shape", shape, "a Sphere, Capsule, Box, Cylinder or Mesh")
+        checked_kind("tcp_from_object", tcp_from_object, Pose)
+        checked_kind("arm", arm, Arm)
         if name in self.names:
             raise UnknownName("free name for a held object", name, ["any that is not in use"])
         last_from_object = last_from_tcp(arm) @ tcp_from_object

@@ -43,7 +43,7 @@ def checked_pairs(pairs: Sequence[tuple[int, int]], count: int) -> list[tuple[in
     Raises:
         WrongType, BadShape, NotFinite, BadOption: not pairs of different whole numbers from 0 to count - 1.
     """
-    if not len(pairs):
+    if not len(checked_items("pairs", pairs, object)):
         return []
     array = checked_array("pairs", pairs, (None, 2))
     bad = np.argwhere(~((array >= 0) & (array < count) & (array == np.round(array))))

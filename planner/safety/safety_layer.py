@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import checked_array, checked_items, is_fit
+from ..arrays import checked_array, checked_items, checked_settings, is_fit
 from ..collision.capsule_placement import place_capsules
 from ..collision.clearance import find_near, min_slack
 from ..collision.robot_arrays import HEADER, LAST_LOOK, ROW, SETTING, robot_arrays
@@ -254,7 +254,7 @@ class SafetyLayer:
         pairs: Sequence[tuple[int, int]] = (),
     ):
         check_range("dt", dt, "(0, inf)")
-        self.settings, self.dt = settings or SafetySettings(), float(dt)
+        self.settings, self.dt = checked_settings(SafetySettings, settings), float(dt)
         arms, bodies = checked_items("arms", arms, Arm), checked_items("bodies", bodies, Body)
         check_bodies(arms, bodies)
         obstacles = checked_items("obstacles", obstacles, Obstacle)

@@ -151,12 +151,16 @@ def test_a_block_that_vanishes_from_the_hand_is_reported_as_dropped(env):
 @pytest.mark.parametrize(
     "settings, error, message",
     [
-        ({"repet": {"shel": 1}}, BadConfig, "repet.shel: unknown key; allowed: distance, shell,"),
-        ({"trimm": 1}, BadConfig, "trimm: unknown key; allowed: motion, safety, resample, trim"),
-        ({"motion": {"controller": {"gian": 1}}}, BadConfig, "motion.controller.gian: unknown key; allowed: law, gain"),
+        ({"repet": {"shel": 1}}, BadConfig, "repet.shel: unknown key; did you mean 'shell'. allowed: distance, shell,"),
+        ({"trimm": 1}, BadConfig, "trimm: unknown key; did you mean 'trim'. allowed: motion, safety, resample, trim"),
+        (
+            {"motion": {"controller": {"gian": 1}}},
+            BadConfig,
+            "motion.controller.gian: unknown key; did you mean 'gain'. allowed: law, gain",
+        ),
         ({"motion": {"guide": "far"}}, BadConfig, "motion.guide: .*number"),
-        ({"resample": -1}, BadOption, "'resample': -1.0 is not a positive number"),
-        ({"motion": {"controller": {"gain": 0}}}, BadOption, "'gain': 0.0 is not a positive number"),
+        ({"resample": -1}, BadConfig, "resample: -1.0 is not a positive number"),
+        ({"motion": {"controller": {"gain": 0}}}, BadConfig, "motion.controller.gain: 0.0 is not a positive number"),
         ({"motion": {"dt": 0.01}}, BadOption, "the task acts every 0.02 s"),
     ],
 )

@@ -98,7 +98,7 @@ def test_where_none_is_shipped_that_is_said(env):
         made(env, "ppo", "")
     with pytest.raises(BadActor, match=r"nowhere\.json: file: does not exist"):
         made(env, "sac", "nowhere")
-    with pytest.raises(BadConfig, match="checkpont: unknown key; allowed: checkpoint, allow_pickle"):
+    with pytest.raises(BadConfig, match=r"checkpont: unknown key; did you mean 'checkpoint'. allowed: checkpoint"):
         make_policy("sac", env.unwrapped.task, DEMONSTRATION, {"checkpont": "x"})
 
 

@@ -320,12 +320,12 @@ def test_a_missing_library_is_one_line_with_its_extra(name, extra, monkeypatch):
 @pytest.mark.parametrize(
     "name, settings, message",
     [
-        ("potential", {"field": {"pull": 2.0}}, "'pull': 2.0 is not in"),
-        ("potential", {"repet": {}}, "repet: unknown key; allowed: motion, safety"),
-        ("dmp-goal", {"dmp": {"weights": 1}}, "'weights': 1 is not from 2"),
-        ("dmp-goal", {"dmp": {"gama": 1}}, "dmp.gama: unknown key; allowed: weights"),
-        ("rrt", {"sampling": {"budget": 0}}, "'budget': 0 is not from 1"),
-        ("rrt", {"sampling": {"step": 0.0}}, "'step': 0.0 is not a positive number"),
+        ("potential", {"field": {"pull": 2.0}}, "field.pull: 2.0 is not in"),
+        ("potential", {"repet": {}}, "repet: unknown key; did you mean 'resample'. allowed: motion, safety"),
+        ("dmp-goal", {"dmp": {"weights": 1}}, "dmp.weights: 1 is not from 2"),
+        ("dmp-goal", {"dmp": {"gama": 1}}, "dmp.gama: unknown key; did you mean 'gamma'. allowed: weights"),
+        ("rrt", {"sampling": {"budget": 0}}, "sampling.budget: 0 is not from 1"),
+        ("rrt", {"sampling": {"step": 0.0}}, "sampling.step: 0.0 is not a positive number"),
     ],
 )
 def test_bad_settings_are_named(name, settings, message):

@@ -11,6 +11,7 @@ import pytest
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
+from onedemo.baselines.programs.arm_executor import ArmExecutor
 from onedemo.baselines.programs.pour_goals import PourGoals, turned_like
 from onedemo.baselines.recording.import_pour import pour_from_poses
 from onedemo.baselines.recording.record_pour import record_pour
@@ -19,10 +20,12 @@ from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.envs.pour.geometry import GLASSES, SOURCE, TARGET, level_hand, tcp_from_glass
+from onedemo.planner import Planner, ReactivePlanner
 from onedemo.planner.errors import BadDemonstration
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.imitation.demonstration_files import read_demonstration, save_demonstration
-from onedemo.planner.imitation.import_recordings import from_pose_table
+from onedemo.planner.recordings.import_recording import demonstration_of
+from onedemo.planner.recordings.pose_table import TableRequest, recording_from_table
 
 RECORDING = Path(__file__).parents[4] / "shared" / "data" / "panda_kinesthetic_pouring.npy"
 needs_recording = pytest.mark.skipif(not RECORDING.exists(), reason="the recording is not shipped")
@@ -123,12 +126,13 @@ def test_a_recording_that_never_tilts_is_refused(tmp_path):
     quarter = Pose.from_yaw([0.0, 0.0, 0.0], -0.5 * np.pi)
     np.save(file, np.array([(level_hand(np.array([0.4, 0.1 * k, 0.3]), 0.0) @ quarter).vector for k in range(5)]))
     with pytest.raises(BadDemonstration, match="tilted by 0 deg at most; pouring begins at 92"):
-        pour_from_poses(from_pose_table(file, name="upright", robot="Panda", rate=10.0))
+        pour_from_poses(demonstration_of(recording_from_table(file, TableRequest(rate=10.0)), name="upright"))
 
 
 @needs_recording
 def test_the_motion_that_a_person_showed_a_real_panda_pours(tmp_path):
-    raw = from_pose_table(RECORDING, name="real", robot="Panda", rate=100.0, units="cm", licence="MIT")
+    recording = recording_from_table(RECORDING, TableRequest(rate=100.0, units="cm"))
+    raw = demonstration_of(recording, name="real", licence="MIT")
     placed = pour_from_poses(raw)
     save_demonstration(placed.demonstration, tmp_path / "pour_real.npz")
     config = load_config(shipped_config("pour_real"), [f"demonstration={tmp_path / 'pour_real.npz'}"])
@@ -140,3 +144,28 @@ def test_the_motion_that_a_person_showed_a_real_panda_pours(tmp_path):
         record = episode(env, level, config=config, shown=placed.demonstration)
         assert record.safe_success, record.detail
     env.close()
+
+
+def test_what_tilts_a_full_glass_and_nothing_else_must_keep_some_of_the_demonstration(env, monkeypatch):
+    answer, go, allow, planned, followed = Planner.answer, ReactivePlanner.go, ArmExecutor.allow, set(), set()
+    tilts, wanted = ("held", "target"), []
+
+    def answered(self, request):
+        planned.add((tilts in request.allowed, request.must_keep))
+        return answer(self, request)
+
+    def allowed(self, contacts):
+        wanted[:] = contacts
+        allow(self, contacts)
+
+    def gone(self, path, **given):
+        followed.add((tilts in wanted, given.get("must_keep", False)))
+        go(self, path, **given)
+
+    monkeypatch.setattr(Planner, "answer", answered)
+    monkeypatch.setattr(ArmExecutor, "allow", allowed)
+    monkeypatch.setattr(ReactivePlanner, "go", gone)
+    assert episode(env, "L0", 0).success
+    # plans of the return, which pours nothing, are asked for without
+    assert (True, True) in planned and (False, False) in planned and (False, True) not in planned
+    assert {(True, True), (False, False)} <= followed and (False, True) not in followed

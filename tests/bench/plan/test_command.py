@@ -300,7 +300,11 @@ def test_robots_come_from_urdf_and_mjcf_files_beside_the_scene(tmp_path, capsys)
         ("sphere", ["start=[0, 0, 0, .nan, 0, 0, 0]"], "command line: start: Panda: q holds .* not finite at index 3"),
         ("sphere", ["allowed=[[hand, bal]]"], "command line: allowed: unknown obstacle 'bal'; known: table, ball"),
         ("sphere", ["allowed=[[paw, ball]]"], "command line: allowed: unknown part of the body 'paw'; known: link0"),
-        ("sphere", ["settings.repet.stp=1"], r"sphere.yaml: settings: repet.stp: unknown key; allowed: distance"),
+        (
+            "sphere",
+            ["settings.repet.stp=1"],
+            r"sphere.yaml: settings: repet.stp: unknown key; did you mean 'step'. allowed: distance",
+        ),
         ("sphere", ["settings.tight=2"], "sphere.yaml: settings: .*tight.*not in"),
         ("sphere", ["robot={urdf: x.urdf, tcp_frame: t}"], "command line: robot: x.urdf: .*no such file"),
         (

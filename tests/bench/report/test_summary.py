@@ -30,7 +30,7 @@ def test_a_row_counts_what_happened(tmp_path):
     assert row["error_max"] == pytest.approx(2.0)
     write_summary(tmp_path / "summary.json", [row])
     assert json.loads((tmp_path / "summary.json").read_text())["rows"][0]["successes"] == 5
-    assert len(verdict(row)) == 3
+    assert verdict(row)[3:] == ["  1 dropped: slipped (seed 104)"]
     assert "5 of 6 succeeded" in verdict(row)[0]
 
 

@@ -138,7 +138,7 @@ def test_the_last_part_reports(tmp_path):
         run = fake_onedemo(tmp_path, "--shard", f"{k}/2", "-o", "parts")
         out, err = run.communicate(timeout=120)
         assert run.returncode == 0, err
-        said = "part 1 of 2 is done; 24 episodes of other parts are missing" in out
+        said = "part 1 of 2 is done; missing of other parts: 24 episodes" in out
         assert said == (k == 1)
     (folder,) = (tmp_path / "parts").iterdir()
     assert (folder / "report.md").is_file()
@@ -188,6 +188,6 @@ def test_a_report_is_made_of_the_folder_alone(tmp_path):
     for cell in grid.cells:
         assert f"| {cell.task} {cell.level} | screw trim={cell.settings['trim']} | 12 |" in text
         assert any(line.startswith(f"{grid.label(cell)}: ") for line in lines)
-    assert len(lines) == 6
+    assert len([line for line in lines if not line.startswith("  ")]) == 6
     with pytest.raises(BadConfig, match="is this a run folder"):
         report(tmp_path)

@@ -69,7 +69,7 @@ def test_a_small_robot_is_measured_kept_and_written(listed, monkeypatch, capsys,
     assert row["plans"]["free"]["solved"] == 3
     assert not (output / "absent.json").exists()
     text = written_page.read_text()
-    assert "1 robots, 0 failed, 1 skipped" in text and "| small | URDF four joints | 4, 1 endless |" in text
+    assert "1 robot, 0 failed, 1 skipped" in text and "| small | URDF four joints | 4, 1 endless |" in text
     assert "- absent: `pip install --no-deps nowhere-at-all`" in text
 
     def again(robot, counts):
@@ -128,7 +128,10 @@ def test_a_raw_error_and_a_missing_file_are_findings(listed, monkeypatch, capsys
         ("robots: []", "robots: is no list of robots"),
         ("robot: 1", "robot: unknown key; allowed: packages, robots"),
         ("robots: [small]", r"robots\[0\]: does not hold `key: value` lines"),
-        ("robots: [{name: a, file: b, tol: c}]", r"robots\[0\]: tol: unknown key; allowed: name, file, package, tool"),
+        (
+            "robots: [{name: a, file: b, tol: c}]",
+            r"robots\[0\]: tol: unknown key; did you mean 'tool'. allowed: name, file, package, tool",
+        ),
         ("robots: [{name: a/b, file: b}]", r"robots\[0\]\.name: 'a/b': allowed are a to z, 0 to 9, _ and -"),
         ("robots: [{name: a, file: b}, {name: a, file: c}]", r"robots\[1\]\.name: 'a' stands twice"),
         ("robots: [{name: a, file: b, package: c}]", r"robots\[0\]\.package: 'c' is not under packages"),

@@ -16,15 +16,22 @@ from onedemo.envs.scene.robot_bodies import robot_body
 from onedemo.envs.scene.robot_description import PARKED
 from onedemo.envs.scene.robots import ROBOTS, places_of, robot_named
 from onedemo.envs.scene.scene import ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, WORLD, compiled_scene
-from onedemo.envs.scene.scene_objects import NOTHING
+from onedemo.envs.scene.scene_objects import NOTHING, TABLE_HEIGHT
 from onedemo.envs.shelve.places import SHELF_PLACES
 from onedemo.envs.simulation.simulation import Simulation, Start
-from onedemo.envs.stack.rules import allowed_contact
+from onedemo.envs.stack.grasps import DOWN
+from onedemo.envs.stack.layout import BASE_PLACE, RANGES
+from onedemo.envs.stack.rules import BLOCK_SIZE, allowed_contact
 from onedemo.planner.collision.capsule_placement import place_capsules
 from onedemo.planner.collision.robot_arrays import ROW, robot_arrays
+from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.errors import BadOption, UnknownName
+from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import pack
 
+GRASPED, LIFTED = TABLE_HEIGHT + 0.5 * BLOCK_SIZE[2], 0.10
+THIRD = GRASPED + 2.0 * BLOCK_SIZE[2] + 0.025
+"""Heights [m] of the hand: at a block on the table, by how much it is lifted, and at the third block of a stack."""
 ARMS = [(robot, side) for robot, kind in ROBOTS.items() for side in kind.ready]
 each_robot = pytest.mark.parametrize("robot", sorted(ROBOTS))
 PLACED = [("Pour", robot) for robot, places in POUR_PLACES.items() if not isinstance(places, str)]
@@ -67,6 +74,34 @@ def test_at_the_start_nothing_touches_and_the_hand_points_down(robot):
     assert sim.data.ncon == 0
     assert scene.arms[0].arm.margin(scene.home[0]) > 0.3
     assert scene.arms[0].arm.fk(scene.home[0]).rotation[2, 2] < -0.95
+
+
+@each_robot
+def test_its_hand_can_point_down_wherever_its_reach_says(robot):
+    index, home = compiled_scene(ROBOTS[robot]).arms[0], compiled_scene(ROBOTS[robot]).home[0]
+    reach, axis, rng = ROBOTS[robot].reach, index.arm.chain[0, 4:6], np.random.default_rng(0)
+    # a stack is never farther than this, see `RANGES` of stacking
+    highest = min(reach.stack, np.hypot(*(np.add(BASE_PLACE, RANGES["L2"].base) - axis)))
+    places = [(r, z) for r in reach[:2] for z in (GRASPED, GRASPED + LIFTED)] + [(highest, THIRD)]
+    for distance, height in places:
+        for direction in np.deg2rad([-30.0, 0.0, 30.0]):
+            at = np.array([*axis, height]) + distance * np.array([np.cos(direction), np.sin(direction), 0.0])
+            for yaw in np.deg2rad([0.0, 45.0, 90.0, 135.0]):
+                assert best_margin(index.arm, home, at, yaw, rng) >= 0.1, (distance, height, direction, yaw)
+
+
+def best_margin(arm, home, at, yaw, rng):
+    """Largest distance [rad] to the joints' limits that was found for a hand that points down, fingers along a yaw."""
+    best = -np.inf
+    for k in range(12):
+        q = np.clip(home + (rng.normal(0.0, 0.8, arm.dof) if k else 0.0), arm.lower, arm.upper)
+        for turn in (yaw, yaw + np.pi):
+            down = Pose.from_yaw([*at], turn) @ Pose.from_position_quaternion([0.0, 0.0, 0.0], DOWN)
+            found = inverse_kinematics(arm, down, q)
+            best = best if found is None else max(best, arm.margin(found))
+        if best >= 0.1:
+            break
+    return best
 
 
 @each_arm

@@ -10,7 +10,7 @@ import pytest
 from helpers.models.urdf_text import joint, link, written
 
 from onedemo.planner import Arm, Body, body_from_urdf
-from onedemo.planner.errors import BadModel
+from onedemo.planner.errors import BadModel, ModelWarning
 from onedemo.planner.fitting import kept_bodies
 from onedemo.planner.fitting.link_capsules import body_of
 
@@ -74,6 +74,20 @@ def test_a_body_with_margins_and_shared_hulls_is_kept_whole(tmp_path, fitted):
         again, read = kept_bodies._read(tmp_path / "one.npz")
         check_equal(body, again)
         assert read == doubts
+
+
+def test_what_is_doubtful_is_said_again_by_a_body_that_was_kept(tmp_path, fitted):
+    """A beam that no joint of the arm moves, and that reaches through all of it."""
+    box, beam = '<box size="0.06 0.06 0.06"/>', '<box size="1.6 0.05 1.6"/>'
+    names = ("base", "one", "two", "tip")
+    joints = [joint(f"to_{b}", a, b, axis="0 1 0", xyz="0 0 0.2") for a, b in pairwise(names)]
+    free = (link("beam", beam), joint("free", "one", "beam", "continuous", xyz="0 0.5 0"))
+    file = written(tmp_path, *(link(name, box) for name in names), *joints, *free)
+    for _ in range(2):
+        with pytest.warns(ModelWarning, match="sweep what hangs on it through") as said:
+            covered(file)
+        assert len([each for each in said if "sweep" in str(each.message)]) == 1
+    assert len(fitted) == 1
 
 
 def test_another_robot_is_fitted(tmp_path, fitted):

@@ -13,8 +13,8 @@ import pytest
 
 from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.errors import BadDemonstration, OneDemoError, UnknownName
-from onedemo.planner.imitation.demonstration import warnings_of
 from onedemo.planner.imitation.demonstration_files import REQUIRED, read_demonstration, save_demonstration
+from onedemo.planner.imitation.demonstration_warnings import warnings_of
 
 
 def shipped_arrays():
@@ -41,7 +41,7 @@ def drop(key):
 def scale(key, columns, factor):
     def mutate(arrays):
         arrays[key] = arrays[key].copy()
-        arrays[key][:, columns] *= factor
+        arrays[key][... if columns is ... else (slice(None), columns)] *= factor
 
     return mutate
 
@@ -124,6 +124,43 @@ BAD = {
         replace("joint_positions", lambda a: a["joint_positions"][:, :6]),
         "joint_positions: has 6 columns; the Panda has 7 joints",
     ),
+    "another number of object poses": (
+        replace("object_paths", lambda a: a["object_paths"][:, :-1]),
+        "object_paths of 'cubeA': has 531 poses; path has 532",
+    ),
+    "one object's path less": (
+        replace("object_paths", lambda a: a["object_paths"][:1]),
+        "object_paths: is for 1; there are 2 names: cubeA, cubeB",
+    ),
+    "object in millimetres": (
+        replace("object_paths", lambda a: a["object_paths"] * [1e3, 1e3, 1e3, 1, 1, 1, 1]),
+        "object_paths of 'cubeA': sample .* m away; are the positions in cm or mm",
+    ),
+    "nameless object paths": (drop("object_path_names"), "object_path_names: is missing, although object_paths is"),
+    "no object paths": (drop("object_paths"), "object_paths: is missing, although object_path_names is there"),
+    "flat object paths": (replace("object_paths", np.zeros((2, 7))), "object_paths: is not an array of numbers with 3"),
+    "object that turns into none": (
+        lambda a: change("object_paths", (0, 5, slice(3, 7)), 0.0)(a),
+        "object_paths of 'cubeA': the quaternion at index 5 has norm 0",
+    ),
+    "nan in a finger": (change("other_joints", (3, 1), np.nan), "other_joints: is not finite at index 3"),
+    "a finger less": (
+        replace("other_joints", lambda a: a["other_joints"][:, :1]),
+        "other_joints: is for 1; there are 2 names",
+    ),
+    "short fingers": (replace("other_joints", lambda a: a["other_joints"][:-1]), "other_joints of .*: has shape"),
+    "short commands": (replace("commanded_poses", lambda a: a["commanded_poses"][:-1]), "commanded: has 531 poses"),
+    "fixture that is an object": (
+        lambda a: a.update(fixture_names=np.array(["cubeA"]), fixture_poses=a["poses"][:1]),
+        "fixtures: 'cubeA' is among object_paths, too",
+    ),
+    "fixture 100 m away": (
+        lambda a: a.update(fixture_names=np.array(["peg"]), fixture_poses=a["poses"][:1] + 100.0 * np.eye(7)[0]),
+        "fixtures of 'peg': sample 0 is .* m away",
+    ),
+    "nanoseconds": (scale("time", ..., 1e9), "time: lasts 2.655e\\+10 s; is it in ms, us or ns"),
+    "milliseconds": (scale("time", ..., 1e3), "time: lasts 26550 s; is it in ms, us or ns"),
+    "minutes": (scale("time", ..., 60.0), "time: lasts 1593 s for a way of .* m: is it in ms, us or ns"),
     "text joints": (
         replace("joint_positions", lambda a: a["joint_positions"].astype(str)),
         "joint_positions: is not an array of numbers",
@@ -274,6 +311,23 @@ def test_saving_and_loading_keeps_everything(tmp_path):
         )
         assert ours.reference_pose.distance_to(theirs.reference_pose) < (1e-12, 1e-12)
     np.testing.assert_array_equal(again.object_sizes["cubeA"], [0.04] * 3)
+
+
+def test_saving_and_loading_keeps_the_scene(tmp_path):
+    demo = read_demonstration(shipped_demonstration("stack"))
+    demo = dataclasses.replace(demo, fixtures={"table": demo.path[3], "shelf": demo.path[9]})
+    save_demonstration(demo, tmp_path / "again.npz")
+    again = read_demonstration(tmp_path / "again.npz")
+    for key in ("object_paths", "fixtures", "other_joints"):
+        assert list(getattr(again, key)) == list(getattr(demo, key)) and len(getattr(demo, key)) == 2
+    for name, path in demo.object_paths.items():
+        np.testing.assert_allclose(again.object_paths[name].vectors, path.vectors, atol=1e-15)
+    for name, values in demo.other_joints.items():
+        np.testing.assert_array_equal(again.other_joints[name], values)
+    for name, pose in demo.fixtures.items():
+        np.testing.assert_allclose(again.fixtures[name].vector, pose.vector, atol=1e-15)
+    assert demo.commanded is not None and again.commanded is not None
+    np.testing.assert_allclose(again.commanded.vectors, demo.commanded.vectors, atol=1e-15)
 
 
 def test_rounded_quaternions_are_accepted_and_made_unit(tmp_path):

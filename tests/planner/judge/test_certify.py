@@ -276,7 +276,7 @@ LIES = {
         lambda g: replace(unclaimed(g), obstacles=(*g.obstacles, blade(g))),
         "clearance: cup",
     ),
-    "a sheet is crossed in one long step": (fast, "clearance: cup is at least 0.03 m inside blade"),
+    "a sheet is crossed in one long step": (fast, "clearance: cup is at least 30.0 mm inside blade"),
 }
 
 

@@ -79,8 +79,8 @@ def test_a_reduced_arm_is_the_whole_arm_with_joints_in_their_places(tmp_path_fac
     [
         ({"j9": 0}, "locked joint 'j9': not in the model; joints: j0, j1"),
         ({"x*": 0}, r"locked joint 'x\*': not in the model"),
-        ({"j0": 2.1}, "locked joint 'j0': 2.1 is beyond its limits -2 to 2"),
-        ({"j*": -2.1}, "locked joint 'j0': -2.1 is beyond its limits"),
+        ({"j0": 2.1}, "locked joint 'j0': 2.1 is beyond its upper limit 2.0"),
+        ({"j*": -2.1}, "locked joint 'j0': -2.1 is beyond its lower limit -2.0"),
         ({"j0": math.nan}, "locked joint 'j0': nan is not a position"),
         ({"j0": "up"}, "locked joint 'j0': 'up' is not a position"),
         ({"j0": None}, "locked joint 'j0': None is not a position"),

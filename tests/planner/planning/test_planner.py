@@ -116,15 +116,17 @@ def test_many_random_scenes_are_solved_and_no_success_is_unsound(kind):
 def test_every_one_of_many_cages_is_an_honest_failure():
     for seed in range(1000, 1150):
         failed = solve(problem("cage", seed))
-        assert not failed.success and failed.reason
+        assert not failed.success and failed.reason not in ("", "start in collision")
 
 
 def test_a_start_that_is_clear_is_not_called_a_collision():
+    """Planning says "start in collision" where this slack is below zero; the cages have the least room at the start."""
     arm, body, _ = panda()
     for seed in range(150):
         scene = problem("cage", seed)
-        room = PlanningScene.of(arm, body, scene.obstacles, SETTINGS).slack(scene.start)
-        assert room >= 0.0 and solve(scene).reason != "start in collision", seed
+        assert PlanningScene.of(arm, body, scene.obstacles, SETTINGS).slack(scene.start) >= 0.0, seed
+    for seed in range(3):
+        assert solve(problem("cage", seed), replace(SETTINGS, search=None)).reason != "start in collision"
 
 
 def test_the_generator_is_a_function_of_its_seed():
@@ -336,7 +338,8 @@ def test_a_start_or_goal_that_cannot_be_is_named_with_part_and_obstacle():
     beyond = home.copy()
     beyond[3] = arm.upper[3] + 0.01
     failed = planner.plan(demonstrated(), beyond, goal)
-    assert failed.why == f"start beyond a joint limit: {arm.joint_names[3]} by 0.010 rad"
+    assert failed.why.startswith(f"start beyond a joint limit: {arm.joint_names[3]} at ")
+    assert failed.why.endswith(" by 0.010 rad")
     far = Obstacle(Sphere(0.05), at([0.0, 0.0, 9.0]), name="far")
     tcp = arm.fk(home).position
     on_hand = [far, Obstacle(Sphere(0.05), at(tcp), name="ball")]

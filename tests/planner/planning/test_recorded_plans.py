@@ -18,11 +18,14 @@ from helpers.random_scenes import SETTINGS, any_shape, anyhow, at, base_gap, cle
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Obstacle
-from onedemo.planner.imitation.import_recordings import from_pose_table, stack_from_teleoperation
+from onedemo.planner.imitation.demonstration import Demonstration
 from onedemo.planner.imitation.segmentation import resampled, trimmed
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
+from onedemo.planner.recordings.import_recording import demonstration_of
+from onedemo.planner.recordings.pose_table import TableRequest, recording_from_table
+from onedemo.planner.recordings.teleoperation import recording_from_teleoperation
 from onedemo.planner.robot.arm import Arm
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
@@ -43,12 +46,18 @@ def table(name: str) -> Path:
 
 
 @cache
+def from_table(file: Path, name: str) -> Demonstration:
+    """The demonstration of a recording in centimeters."""
+    return demonstration_of(recording_from_table(file, TableRequest(rate=50.0, units="cm")), name=name)
+
+
 def motion(name: str) -> PosePath:
     """A recorded motion of the tcp in the world, in steps of 5 mm."""
     if name in TABLES:
-        demo = from_pose_table(table(name), name=name, robot="Panda", rate=50.0, units="cm")
+        demo = from_table(table(name), name)
         return resampled(demo.segment_path(demo.segments[0].name).moved(world_from_base()), 0.005)
-    demo = stack_from_teleoperation(DATA / "panda_teleop_stack.npz", panda()[0], name="stack", licence="MIT")
+    recording = recording_from_teleoperation(DATA / "panda_teleop_stack.npz", panda()[0])
+    demo = demonstration_of(recording, name="stack", names=("approach", "transfer"))
     return resampled(trimmed(demo.segment_path(name), 0.02), 0.005)
 
 
@@ -109,7 +118,7 @@ def test_recorded_motions_are_planned_to_a_hundred_goals(name):
 @pytest.mark.parametrize("name", TABLES)
 def test_centimeters_become_meters(name):
     raw = np.load(table(name), allow_pickle=False)
-    demo = from_pose_table(table(name), name=name, robot="Panda", rate=50.0, units="cm")
+    demo = from_table(table(name), name)
     np.testing.assert_allclose(demo.path.positions, raw[:, :3] / 100.0, atol=1e-6)
     reach = np.linalg.norm(motion(name).positions - world_from_base().position, axis=1)
     assert reach.min() > 0.2 and reach.max() < 0.86, "within the Panda's reach"
@@ -125,7 +134,7 @@ def test_signs_repeats_and_a_trembling_hand_change_little(name, tmp_path):
     spoilt = np.repeat(spoilt, rng.integers(1, 4, len(raw)), axis=0)
     spoilt[:, :3] += rng.normal(size=(len(spoilt), 3)) * 0.002
     np.save(tmp_path / "spoilt.npy", spoilt)
-    demo = from_pose_table(tmp_path / "spoilt.npy", name=name, robot="Panda", rate=50.0, units="cm")
+    demo = from_table(tmp_path / "spoilt.npy", name)
     path = resampled(demo.path.moved(world_from_base()), 0.005)
     arm, body, _ = panda()
     start, goal, obstacles = problem_of(name, 0)
@@ -137,7 +146,7 @@ def test_signs_repeats_and_a_trembling_hand_change_little(name, tmp_path):
 @pytest.mark.parametrize("name", TABLES)
 def test_a_recording_is_planned_as_it_is_too(name):
     """All of its samples, not resampled."""
-    demo = from_pose_table(table(name), name=name, robot="Panda", rate=50.0, units="cm")
+    demo = from_table(table(name), name)
     arm, body, _ = panda()
     start, goal, _ = problem_of(name, 0)
     found = Planner(arm, body).plan(demo.path.moved(world_from_base()), start, goal)

@@ -1,0 +1,1 @@
+"""Recordings become demonstrations, and what these show."""
