@@ -48,6 +48,8 @@ def test_a_signal_that_moves_slowly_changes_once_and_hovering_changes_nothing():
     hover = np.concatenate([[-1.0, -1.0, 1.0], 0.1 * np.cos(np.arange(20)), [-1.0]])
     command, _ = gripper_command(hover, None, BLAME)
     np.testing.assert_array_equal(command, [-1.0] * 2 + [1.0] * 21 + [-1.0])
+    command, _ = gripper_command(np.concatenate([[-1.0], 0.1 * np.cos(np.arange(20)), [1.0]]), None, BLAME)
+    np.testing.assert_array_equal(command, [-1.0] * 21 + [1.0])
 
 
 def test_zeros_of_a_command_leave_the_gripper_as_it_is():

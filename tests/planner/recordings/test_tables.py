@@ -130,6 +130,7 @@ XYZW = (0, 1, 2, 4, 5, 6, 3)
         (rows("x,y,z,qw,qx,qy,qy"), {}, "header: names 'qy' twice"),
         (rows("x,y,z,quat_0,quat_1,quat_2,quat_3"), {}, "numbers the quaternion's components: say --quaternion"),
         ("nan" + rows()[11:], {}, r"column 'x': is not finite at index 0 \(line 1\)"),
+        ("n/a" + rows()[11:], {}, "line 1: column 1: 'n/a' is not a number"),
         (rows("x,y,z,qw,qx,qy,qz") + "1,2,oops,1,0,0,0\n", {}, "line 10: column 'z': 'oops' is not a number"),
         (rows("x,y,z,qw,qx,qy,qz") + "1,,3,1,0,0,0\n", {}, "line 10: column 'y': is empty"),
         (rows("x,y,z,qw,qx,qy,qz") + "1,2,3,1,0,0\n", {}, "line 10: has 6 fields; the header has 7"),
