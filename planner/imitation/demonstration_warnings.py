@@ -7,9 +7,6 @@ import numpy as np
 from .demonstration import Demonstration
 from .segmentation import dwells
 
-JUMP, FASTEST = 10.0, 3.0
-"""A step is called a jump if it is this many times as fast as the median, and faster than this [m/s]."""
-
 
 def warnings_of(demonstration: Demonstration) -> list[str]:
     """List peculiarities of a demonstration to know before using it; none of them is an error."""
