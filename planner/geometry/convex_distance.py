@@ -137,7 +137,7 @@ def convex_distance(
         bound = dot(v, w) / length
         if bound > proven:
             proven, normal = bound, (v[0] / length, v[1] / length, v[2] / length)
-        if proven > cutoff or length - proven < CLOSE or w in (p0, p1, p2, p3):
+        if proven > max(cutoff, 0.0) or length - proven < CLOSE or w in (p0, p1, p2, p3):
             break
         # corners without weight are dropped, the new one takes the first free place
         if weights[0] == 0.0:

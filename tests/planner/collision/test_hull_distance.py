@@ -20,7 +20,7 @@ from onedemo.planner.collision.capsule_placement import place_capsules
 from onedemo.planner.collision.clearance import find_near, min_slack, slack_at
 from onedemo.planner.collision.edge_certificates import is_clear, tool_arrays, tool_slack
 from onedemo.planner.collision.hull_distance import CLOSE, obstacle_hull_distance, pair_hull_distance
-from onedemo.planner.collision.robot_arrays import HEADER, NEAR_PAIR, ROW, robot_arrays
+from onedemo.planner.collision.robot_arrays import CAPSULE, HEADER, NEAR_PAIR, ROW, robot_arrays
 from onedemo.planner.collision.step_certificates import near_pair_slack, step_stays_clear
 from onedemo.planner.errors import BadModel, BadOption, BadShape, UnknownName, WrongType
 from onedemo.planner.geometry import screw
@@ -28,6 +28,7 @@ from onedemo.planner.geometry.convex_distance import PER_ROW, convex_distance
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Mesh, Obstacle, Sphere, core_of, pack
 from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear
+from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body, Hull
 from onedemo.planner.robot.joint_frames import joint_frames, moved
 from onedemo.planner.safety.barrier import _lay_bounds
@@ -215,6 +216,35 @@ def test_a_proven_step_stays_clear_in_between(seed, size):
             assert sampled_slack(g, q, step) > -1e-6
         if joint_edge_is_clear(g, q, q + step):
             assert sampled_slack(g, q, step) > -1e-6
+
+
+def test_a_bar_that_turns_about_its_end_is_not_proven_past_a_post_in_its_swing():
+    """The core stands still on the axis: only the hull moves."""
+    turn = Arm("turntable", ("turn",), np.eye(2, 8), [-3.0], [3.0], [1.0])
+    bar = Hull(np.array([[x, y, z] for x in (0.0, 0.2) for y in (-0.005, 0.005) for z in (-0.005, 0.005)]))
+    body = Body(np.array([[0, 0, 0, 0, 0, 0, 0, 0.201]]), ("bar",), hulls=(bar,))
+    post = Obstacle(Sphere(0.01), Pose.from_position_quaternion([0.15 * math.cos(0.4), 0.15 * math.sin(0.4), 0.0]))
+    g = robot_arrays((turn,), (body,), pack([post]), margin=0.001, settings=SAFETY.packed(0.01))
+    assert min(slack_at(g, np.array([angle]), 0.0, 1.0) for angle in (0.0, 0.8)) > 0.03
+    assert slack_at(g, np.array([0.4]), 0.0, 1.0) < 0.0
+    for step, is_proven in ((0.8, False), (0.7, False), (0.1, True)):
+        place_capsules(g, np.zeros(1), ROW.placed)
+        find_near(g, 5.0)
+        assert step_stays_clear(g, np.zeros(1), np.array([step]), 0.01) == is_proven
+    assert not joint_edge_is_clear(g, np.zeros(1), np.array([0.8]))
+
+
+@for_all(seeds, st.floats(-0.2, 0.2), max_examples=60)
+def test_beyond_any_cutoff_a_lower_bound_suffices_and_up_to_it_the_distance_is_exact(seed, cutoff):
+    """A negative cutoff too: a robot that is too close already asks by how much."""
+    g, arm, _, pairs, _, rng = robot(seed)
+    place_capsules(g, rng.uniform(-2.5, 2.5, arm.dof), ROW.placed)
+    for i, j in pairs:
+        if g[ROW.body + i, CAPSULE.corners] + g[ROW.body + j, CAPSULE.corners] == 0.0:
+            continue
+        truth, found = (pair_hull_distance(g, ROW.placed, i, j, limit)[0] for limit in (math.inf, cutoff))
+        assert found <= truth + 1e-9
+        assert found > cutoff if truth > cutoff else found == pytest.approx(truth, abs=1e-6)
 
 
 def test_steps_are_proven_that_capsules_alone_could_not_prove():

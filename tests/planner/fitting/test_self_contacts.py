@@ -212,7 +212,7 @@ def test_the_nearest_point_of_a_surface_is_as_near_as_no_other_of_its_triangles(
     gap, least = np.linalg.norm(point - foot), to_triangles(point[None], triangles)[0]
     # on an edge it is not exact: a corner stands for it
     assert to_triangles(foot[None], triangles)[0] < 1e-9 and gap >= least - 1e-9
-    corners = np.linalg.norm(points - point, axis=1).min()
+    corners = np.linalg.norm(triangles.reshape(-1, 3) - point, axis=1).min()
     assert gap <= corners + 1e-12
 
 

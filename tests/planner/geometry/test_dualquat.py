@@ -95,7 +95,8 @@ def test_twice_the_logarithm_is_pinocchios_log6(x):
     motion = pin.SE3(Pose(x).matrix)
     oracle, twist, log = pin.log6(motion).vector, dq.twist_from_dq(x), dq.log(x)
     np.testing.assert_allclose(twist, oracle, rtol=0, atol=matrix_log_tolerance(x))
-    np.testing.assert_array_equal(2 * np.concatenate([log[5:], log[1:4]]), twist)
+    # to the bit, but where halves are too small to have all their digits
+    np.testing.assert_allclose(2 * np.concatenate([log[5:], log[1:4]]), twist, rtol=0, atol=np.finfo(float).tiny)
     assert log[0] == log[4] == 0.0
     np.testing.assert_allclose(pin.exp6(pin.Motion(twist)).homogeneous, motion.homogeneous, rtol=0, atol=1e-10)
 

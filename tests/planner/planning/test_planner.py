@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import re
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from helpers.arms import READY, panda_urdf, random_arm
+from helpers.planner.planned import assert_sound, free_leg
 from helpers.random_scenes import (
     KINDS,
     SETTINGS,
@@ -25,8 +23,7 @@ from helpers.random_scenes import (
 )
 from helpers.strategies import for_all, st
 
-from onedemo.planner.errors import BadOption, BadShape, NotFinite, UnknownName
-from onedemo.planner.escape.repet import MAX_OBSTACLES, RepetSettings
+from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.fitting.body_readers import body_from_urdf
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.geometry.shapes import Box, Capsule, Obstacle, Sphere
@@ -36,30 +33,14 @@ from onedemo.planner.planning.batch import plan_batch
 from onedemo.planner.planning.joint_space_motion import (
     NO_CLEAR_POSTURE,
     NO_JOINT_PATH,
-    RAMP,
     NextMotionCheck,
-    path_deviation,
-    timed_on_lines,
 )
-from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
 from onedemo.planner.planning.plan import NextMotion, Plan, PlanRequest
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.refine import scene_of
-from onedemo.planner.planning.settings import JointSearchSettings, PlanSettings
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body
-from onedemo.planner.safety.safety_layer import SafetySettings
-
-WAYS = ("direct", "escape", "joint search")
-
-
-def assert_sound(plan: Plan, arm, body, start, goal, obstacles, allowed=(), settings=SETTINGS) -> None:
-    """The plan is a success, starts where it must, and its judge agrees."""
-    assert plan.success and plan.how in WAYS, plan.reason
-    np.testing.assert_array_equal(plan.joints[0], start)
-    certificate = certify(log_of(plan, arm, body, goal, obstacles, settings, allowed))
-    assert certificate.ok, certificate.reasons
 
 
 def same_plan(one: Plan, two: Plan) -> bool:
@@ -135,15 +116,6 @@ def test_the_generator_is_a_function_of_its_seed():
         np.testing.assert_array_equal(one.start, two.start)
         np.testing.assert_array_equal(one.goal.dq, two.goal.dq)
         assert not np.array_equal(one.start, problem(kind, 6).start)
-
-
-# What a plan is
-
-
-def free_leg(yaw: float = 0.3) -> tuple[np.ndarray, Pose]:
-    """The usual joints of the Panda, and a goal beside it."""
-    turn = Pose.from_yaw([0, 0, 0], yaw) @ at([0, 0, 0], demonstrated()[-1].quaternion)
-    return panda()[2], at([0.0, 0.2, 1.0], turn.quaternion)
 
 
 @for_all(st.floats(-0.6, 0.6), st.floats(-0.15, 0.1), st.floats(-0.3, 0.3), st.floats(0.9, 1.1), max_examples=15)
@@ -314,88 +286,6 @@ def test_a_demonstration_of_one_pose_is_a_goal():
             assert found.how == ("escape" if obstacles else "direct")
 
 
-def test_a_leg_of_no_length_is_planned():
-    arm, body, home = panda()
-    here = arm.fk(home)
-    found = Planner(arm, body).plan(PosePath(np.array([here.dq] * 5)), home, here)
-    assert_sound(found, arm, body, home, here, ())
-    assert np.abs(found.joints - home).max() < 1e-2
-
-
-@pytest.mark.parametrize("place", [(3.0, 0.0, 1.0), (0.0, 0.0, 3.0), (-0.56, 0.0, 0.95)])
-def test_a_goal_out_of_reach_is_an_honest_failure(place):
-    arm, body, home = panda()
-    _, near = free_leg()
-    for obstacles in ((), (Obstacle(Sphere(0.05), at([0.3, 0.0, 1.0])),)):
-        failed = Planner(arm, body).plan(demonstrated(), home, at(place, near.quaternion), obstacles)
-        assert failed.reason == "ik_or_limit"
-        np.testing.assert_array_equal(failed.joints, home[None])
-
-
-def test_a_start_or_goal_that_cannot_be_is_named_with_part_and_obstacle():
-    arm, body, home = panda()
-    planner, (_, goal) = Planner(arm, body), free_leg()
-    beyond = home.copy()
-    beyond[3] = arm.upper[3] + 0.01
-    failed = planner.plan(demonstrated(), beyond, goal)
-    assert failed.why.startswith(f"start beyond a joint limit: {arm.joint_names[3]} at ")
-    assert failed.why.endswith(" by 0.010 rad")
-    far = Obstacle(Sphere(0.05), at([0.0, 0.0, 9.0]), name="far")
-    tcp = arm.fk(home).position
-    on_hand = [far, Obstacle(Sphere(0.05), at(tcp), name="ball")]
-    failed = planner.plan(demonstrated(), home, goal, on_hand)
-    assert failed.reason == "start in collision" and failed.detail in ("fingers touches ball", "hand touches ball")
-    elbow = [Obstacle(Sphere(0.05), at([-0.56, 0.0, 1.5])), far]
-    failed = planner.plan(demonstrated(), home, goal, elbow)
-    assert failed.reason == "start in collision" and re.fullmatch("link[34] touches obstacle 0", failed.detail)
-    on_goal = [far, Obstacle(Sphere(0.05), at(goal.position), name="cup")]
-    failed = planner.plan(demonstrated(), home, goal, on_goal)
-    assert failed.reason == "goal in collision" and failed.detail in ("fingers touches cup", "hand touches cup")
-    # what is held is named as what it is, and what is near but apart with the distance
-    holding = Planner(arm, body.holding("held", Box((0.05, 0.05, 0.05)), at([0.0, 0.0, 0.04]), arm))
-    for start, end, place in ((home, goal, arm.fk(home)), (home, goal, goal)):
-        below = [Obstacle(Box((0.2, 0.2, 0.02)), at(place.position - [0.0, 0.0, 0.085]), name="shelf")]
-        failed = holding.plan(demonstrated(), start, end, below)
-        which = "goal" if place is goal else "start"
-        assert re.fullmatch(
-            rf"{which} in collision: held (touches shelf|is \d\.\d mm from shelf, which must be 10\.0)", failed.why
-        ), failed.why
-
-
-def test_what_is_too_close_for_a_detour_is_named():
-    arm, body, home = panda()
-    goal = at([0.0, 0.4, 1.0], free_leg()[1].quaternion)
-    wall = Obstacle(Box((2.0, 0.02, 3.0)), at([0.65, 0.2, 1.0]), name="wall")
-    shelf = Obstacle(Box((0.2, 0.2, 0.02)), at(goal.position - [0.0, 0.0, 0.3]), name="shelf")
-    gap = PlanningScene.of(arm, body, [shelf], SETTINGS).tool_slack(goal) + SETTINGS.safety.distance
-    near = Obstacle(shelf.shape, at([0.0, 0.0, gap - 0.015]) @ shelf.pose, name="shelf")
-    planner = Planner(arm, body, PlanSettings(search=None))
-    failed = planner.plan(demonstrated(), home, goal, [wall, near])
-    assert failed.why == "no room for a detour at the goal: fingers is 15.0 mm from shelf, which must be 20.0"
-    farther = planner.plan(demonstrated(), home, goal, [wall, shelf])
-    assert not farther.success and "no room" not in farther.why
-
-
-def test_a_tree_that_is_stopped_says_so():
-    scene = problem("cage", 1)
-    few = replace(SETTINGS, repet=replace(SETTINGS.repet, nodes=200), search=None)
-    failed = solve(scene, few)
-    assert failed.why == "node limit reached: a tree had 200 nodes, see repet.nodes"
-    assert failed.tree is not None and len(failed.tree.poses) == 200
-    many = replace(SETTINGS, repet=replace(SETTINGS.repet, nodes=200_000, levels=5), search=None)
-    failed = solve(scene, many)
-    assert re.fullmatch(r"no escape found: \d+ nodes in the last of 5 trees", failed.why)
-
-
-def test_no_tree_of_another_leg_is_shown():
-    arm, body, home = panda()
-    _, goal = free_leg()
-    planner = Planner(arm, body)
-    scene = problem("cage", 0)
-    assert planner.plan(demonstrated(), scene.start, scene.goal, scene.obstacles).tree is not None
-    assert planner.plan(demonstrated(), home, goal).tree is None
-
-
 # Good plans and fallbacks
 
 
@@ -430,88 +320,6 @@ def test_fallbacks_are_kept_only_where_nothing_better_is_found():
             better += two.imitated_share > one.imitated_share + 0.05 or two.end_margin > one.end_margin + 0.05
             assert two.tries <= one.tries + SETTINGS.effort
     assert tried >= 10 and better >= 0.5 * tried
-
-
-def test_a_plan_that_ends_at_a_joint_limit_is_a_fallback():
-    scene = problem("convex", 0)
-    one, two = solve(scene, replace(SETTINGS, effort=0)), solve(scene)
-    assert one.success and one.end_margin < SETTINGS.end_margin < two.end_margin
-    assert judged(scene, two).ok
-
-
-def test_what_stands_in_the_base_is_a_collision_or_nobodys():
-    arm, body, _ = panda()
-    start, goal = free_leg()
-    inside = [Obstacle(Sphere(0.05), at([-0.56, 0.0, 0.95]), name="core")]
-    found = Planner(arm, body).plan(demonstrated(), start, goal, inside)
-    assert found.reason == "start in collision" or certify(log_of(found, arm, body, goal, inside)).ok
-
-
-def test_numbers_that_are_none_and_wrong_shapes_are_one_line():
-    arm, body, home = panda()
-    planner, (_, goal) = Planner(arm, body), free_leg()
-    bad = home.copy()
-    bad[2] = np.nan
-    for start, error in ((bad, NotFinite), (home[:6], BadShape), (home[None], BadShape)):
-        with pytest.raises(error) as caught:
-            planner.plan(demonstrated(), start, goal)
-        assert "\n" not in str(caught.value)
-    many = [Obstacle(Sphere(0.01), at([5, 5, 5]))] * 10_000
-    with pytest.raises(BadOption, match=f"10000; allowed are {MAX_OBSTACLES}"):
-        planner.plan(demonstrated(), home, goal, many)
-
-
-@for_all(st.integers(0, 10**6), max_examples=15)
-def test_any_start_and_goal_give_a_plan_or_a_reason(seed):
-    """Nothing is asked of the draw but that it is finite."""
-    arm, body, _ = panda()
-    rng = np.random.default_rng(seed)
-    start = rng.uniform(arm.lower, arm.upper)
-    goal = arm.fk(rng.uniform(arm.lower, arm.upper))
-    around = [Obstacle(Sphere(0.1), at(rng.normal(size=3))) for _ in range(3)]
-    settings = replace(SETTINGS, search=JointSearchSettings(iterations=300, rounds=1))
-    found = Planner(arm, body, settings).plan(demonstrated(), start, goal, around, seed=seed)
-    if found.success:
-        assert_sound(found, arm, body, start, goal, around)
-    else:
-        assert found.reason
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"tight": 0.0}, {"tight": 1.1}, {"tight": math.nan}, {"biases": ()}, {"spacing": 0.0}, {"max_seconds": 0.0},
-        {"max_seconds": math.inf}, {"repet": RepetSettings(distance=0.012)},
-        {"safety": SafetySettings(distance=0.03)},
-    ],
-    ids=str,
-)  # fmt: skip
-def test_settings_out_of_range_are_refused_in_one_line(values):
-    with pytest.raises(BadOption) as caught:
-        PlanSettings(**values)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "values", [{"step": 0.0}, {"step": 11.0}, {"speed": 0.0}, {"iterations": 0}, {"nodes": 0}, {"rounds": 0}], ids=str
-)
-def test_search_settings_out_of_range_are_refused_in_one_line(values):
-    with pytest.raises(BadOption, match=next(iter(values))):
-        JointSearchSettings(**values)
-
-
-def test_without_search_and_detours_there_is_the_safety_layer_alone():
-    ways = {"all": SETTINGS, "no search": replace(SETTINGS, search=None), "none": replace(SETTINGS, avoid=False)}
-    solved = dict.fromkeys(ways, 0)
-    for name, settings in ways.items():
-        for seed in range(8):
-            scene = problem("gap", seed)
-            found = solve(scene, settings)
-            solved[name] += found.success
-            if found.success:
-                assert judged(scene, found).ok
-                assert found.how in WAYS[: {"all": 3, "no search": 2, "none": 1}[name]]
-    assert solved["none"] < solved["all"] and solved["no search"] < solved["all"] == 8
 
 
 # Any arm, without a simulator
@@ -579,64 +387,6 @@ def test_frames_of_the_world_do_not_matter_to_success():
         plans.append(Planner(arm, body).plan(path, READY, goal, ball))
         assert_sound(plans[-1], arm, body, READY, goal, ball)
     assert plans[0].how == plans[1].how == "escape"
-
-
-# Ways through joint space
-
-
-@for_all(st.integers(0, 10**6), st.sampled_from([1e-5, 0.01, 0.3, 3.0]), max_examples=60)
-def test_a_way_in_time_stays_on_its_lines_and_keeps_the_speeds_from_rest_to_rest(seed, size):
-    """Every point is on one of the lines, in order; corners are taken at rest; ramps are kept."""
-    rng = np.random.default_rng(seed)
-    points = np.cumsum(rng.normal(0.0, size, (int(rng.integers(2, 6)), 7)), axis=0)
-    speeds, dt = rng.uniform(0.5, 2.0, 7), 0.02
-    rows = timed_on_lines(points, speeds, dt)
-    assert np.abs(rows[0] - points[0]).max() == 0.0 and np.allclose(rows[-1], points[-1], atol=1e-12)
-    assert (np.abs(np.diff(rows, axis=0)) <= speeds * dt * (1 + 1e-9)).all()
-    accelerations = np.abs(np.diff(np.vstack([rows[:1], rows, rows[-1:]]), n=2, axis=0)) / dt**2
-    assert (accelerations <= 1.01 * speeds / RAMP + 1e-9).all()
-    line, along = 0, 0.0
-    for row in rows[1:]:
-        way = points[line + 1] - points[line]
-        s = float((row - points[line]) @ way / (way @ way))
-        assert along < s <= 1.0 + 1e-9 and np.abs(points[line] + s * way - row).max() < 1e-9
-        along = s
-        if s > 1.0 - 1e-9:
-            line, along = line + 1, 0.0
-    assert line == len(points) - 1
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_shortened_ways_keep_their_ends_get_no_longer_and_stay_clear(seed):
-    scene = problem("gap", seed)
-    arm, body, _ = panda()
-    robot = PlanningScene.of(arm, body, scene.obstacles, SETTINGS).robot
-    rng, found = np.random.default_rng(seed), 0
-    for _ in range(40):
-        points = np.clip(scene.start + np.cumsum(rng.normal(0.0, 0.12, (6, 7)), axis=0), arm.lower, arm.upper)
-        if not all(joint_edge_is_clear(robot, a, b) for a, b in pairwise(points)):
-            continue
-        path = np.zeros((40, 7))
-        path[:6] = points
-        count = shortcut(robot, path, 6, 100, np.array([seed + 1.0]), np.empty((2, 7)))
-        short = path[:count]
-        np.testing.assert_array_equal(short[[0, -1]], points[[0, -1]])
-        lengths = [np.abs(np.diff(way, axis=0)).max(axis=1).sum() for way in (points, short)]
-        assert lengths[1] <= lengths[0] + 1e-12
-        assert all(joint_edge_is_clear(robot, a, b) for a, b in pairwise(short))
-        found += lengths[1] < 0.9 * lengths[0]
-    assert found
-
-
-def test_how_far_a_tool_strays_is_its_distance_from_the_edges_of_its_path():
-    arm, _, home = panda()
-    start = arm.fk(home)
-    path = screw_path(start, at([0.0, 0.1, 0.0]) @ start, 0.01)
-    assert path_deviation(arm, home[None], path.dqs) < 1e-12
-    assert path_deviation(arm, home[None], path[3:].dqs) == pytest.approx(path[3].distance_to(start)[0], abs=1e-9)
-    lifted = screw_path(at([0.0, -0.005, 0.02]) @ start, at([0.0, 0.1, 0.02]) @ start, 0.01)
-    assert path_deviation(arm, home[None], lifted.dqs) == pytest.approx(0.02, abs=1e-9)
-    assert path_deviation(arm, home[None], start.dq[None]) < 1e-12
 
 
 def test_a_leg_that_must_go_on_ends_where_it_can():

@@ -24,7 +24,8 @@ from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.recordings.import_recording import demonstration_of
-from onedemo.planner.recordings.pose_table import TableRequest, recording_from_table
+from onedemo.planner.recordings.pose_columns import TableRequest
+from onedemo.planner.recordings.pose_table import recording_from_table
 from onedemo.planner.recordings.teleoperation import recording_from_teleoperation
 from onedemo.planner.robot.arm import Arm
 
@@ -48,7 +49,9 @@ def table(name: str) -> Path:
 @cache
 def from_table(file: Path, name: str) -> Demonstration:
     """The demonstration of a recording in centimeters."""
-    return demonstration_of(recording_from_table(file, TableRequest(rate=50.0, units="cm")), name=name)
+    return demonstration_of(
+        recording_from_table(file, TableRequest(rate=50.0, units="cm", quaternion="wxyz")), name=name
+    )
 
 
 def motion(name: str) -> PosePath:

@@ -8,6 +8,7 @@ import os
 import numpy as np
 import pytest
 from helpers.arms import READY, panda, random_arm
+from helpers.planner.guarded_point import BALL, DT, gantry, point_among
 from helpers.solids import KINDS, random_pose, random_shape
 from helpers.strategies import for_all
 from hypothesis import strategies as st
@@ -19,7 +20,6 @@ from soak import (
     STATUS,
     STEPS,
     STOPPED,
-    TALLY,
     TOO_CLOSE,
     WORST,
     facing_pandas,
@@ -34,10 +34,9 @@ from soak import (
 from onedemo.planner import jit
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.collision.robot_arrays import HEADER, NEAR_PAIR, ROW
-from onedemo.planner.errors import BadModel, BadOption, BadShape, NotFinite, UnknownName, WrongType
+from onedemo.planner.errors import UnknownName
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
-from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body
 from onedemo.planner.safety.safety_layer import (
     BLOCKED,
@@ -54,23 +53,6 @@ seeds, kinds = st.integers(0, 10**6), st.sampled_from(KINDS)
 SHARE = float(os.environ.get("ONEDEMO_SOAK", "1"))
 """Scales the long runs."""
 SCENES, STEPS_EACH = 40, max(20, round(2500 * SHARE))
-DT = 0.01
-
-
-def gantry(reach: float = 5.0, speed: float = 100.0) -> Arm:
-    """A point in space: three sliding joints along x, y and z."""
-    chain = np.zeros((4, 8))
-    half = math.sqrt(0.5)
-    chain[:, :4] = [[half, 0, half, 0], [0.5, -0.5, -0.5, -0.5], [half, half, 0, 0], [1, 0, 0, 0]]
-    chain[:3, 7] = 1.0
-    return Arm("gantry", ("x", "y", "z"), chain, np.full(3, -reach), np.full(3, reach), np.full(3, speed))
-
-
-BALL = Body(np.array([[2, 0, 0, 0, 0, 0, 0, 0.02]]), ("ball",))
-
-
-def point_among(obstacles, dt=DT, speed=100.0, **options) -> SafetyLayer:
-    return SafetyLayer([gantry(speed=speed)], [BALL], obstacles, dt, **options)
 
 
 # ------------------------------------------------------------------ no change without need
@@ -457,66 +439,3 @@ def test_the_inputs_are_not_written_to():
     before = q.tobytes(), u.tobytes()
     layer(q, u)
     assert before == (q.tobytes(), u.tobytes())
-
-
-# ------------------------------------------------------------------ bad input
-
-
-@pytest.mark.parametrize("name", ["alpha", "shell", "limit_gain", "rotation_weight", "rest_weight", "acceleration"])
-@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
-def test_rates_must_be_positive(name, bad):
-    with pytest.raises(BadOption, match=f"{name}.*positive"):
-        SafetySettings(**{name: bad})
-
-
-@pytest.mark.parametrize("name", ["distance", "self_distance", "buffer", "lead"])
-@pytest.mark.parametrize("bad", [-1e-9, np.nan, np.inf])
-def test_distances_must_not_be_negative(name, bad):
-    with pytest.raises(BadOption, match=name):
-        SafetySettings(**{name: bad})
-
-
-@pytest.mark.parametrize(
-    "change, name",
-    [
-        ({"decay": 0.0}, "decay"),
-        ({"decay": 1.1}, "decay"),
-        ({"decay": np.nan}, "decay"),
-        ({"halvings": 0}, "halvings"),
-        ({"halvings": 31}, "halvings"),
-        ({"shell": 0.01}, "shell.*distance"),
-        ({"self_distance": 0.06}, "shell"),
-    ],
-)
-def test_settings_that_contradict_each_other_are_refused(change, name):
-    with pytest.raises(BadOption, match=name):
-        SafetySettings(**change)
-
-
-def test_bad_calls_are_refused_by_name():
-    for dt in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(BadOption, match="dt"):
-            point_among([], dt)
-    layer = point_among([])
-    with pytest.raises(BadShape, match=r"safety: q.*\(3,\)"):
-        layer(np.zeros(7), np.zeros(3))
-    with pytest.raises(BadShape, match="safety: velocity"):
-        layer(np.zeros(3), np.zeros((1, 3)))
-    with pytest.raises(NotFinite, match=r"safety: q .* at index 1"):
-        layer([0.0, np.nan, 0.0], np.zeros(3))
-    with pytest.raises(BadOption, match="3 arms"):
-        SafetyLayer([gantry()] * 3, [BALL] * 3, [], DT)
-    with pytest.raises(BadModel, match="robot: bodies: there are 2 for 1 arms"):
-        SafetyLayer([gantry()], [BALL] * 2, [], DT)
-    foreign = Body(np.array([[7.0, 0, 0, 0, 0, 0, 0, 0.01]]), ("hand",))
-    with pytest.raises(BadModel, match=r"body: hand: moves with joint 7; .* has joints 0 to 2"):
-        SafetyLayer([gantry()], [foreign], [], DT)
-    for pair in ((0, 1), (-1, 0), (0, 0.5), (0, 1e9)):
-        with pytest.raises(BadOption, match=r"pair 0 names capsule .*; there are capsules 0 to 0"):
-            SafetyLayer([gantry()], [BALL], [], DT, pairs=[pair])
-    with pytest.raises(BadOption, match="pair 0 names capsule 0 twice"):
-        SafetyLayer([gantry()], [BALL], [], DT, pairs=[(0, 0)])
-    for allowed in ([("hand",)], ["ab"], [("hand", 3)]):
-        with pytest.raises(WrongType, match=r"allowed\[0\] is .*; expected a pair of names"):
-            SafetyLayer([gantry()], [BALL], [], DT, allowed=allowed)
-    assert TALLY == 12
