@@ -11,20 +11,28 @@ import numpy as np
 
 from ...baselines.recording.import_pour import pour_from_poses
 from ...configs import BadConfig
-from ...envs import ROBOTS
 from ...planner import Arm, Demonstration, Pose
 from ...planner.errors import BadDemonstration
-from ...planner.recordings.cuts import SegmentRequest
+from ...planner.recordings.cuts import LEAVING, SegmentRequest
 from ...planner.recordings.import_recording import demonstration_of
-from ...planner.recordings.kinematic_check import checked_against_joints, joints_path
-from ...planner.recordings.pose_table import TableRequest, recording_from_table
-from ...planner.recordings.recording import Recording
+from ...planner.recordings.kinematic_check import gaps_in_words, reach_in_words
+from ...planner.recordings.pose_columns import TableRequest
+from ...planner.recordings.pose_table import recording_from_table
+from ...planner.recordings.recording import Recording, blame_of
 from ...planner.recordings.teleoperation import recording_from_teleoperation
 from ..console import COMMAND_LINE
 from .hdf5_episode import ENDINGS, recording_from_hdf5
+from .robot_checks import about_robot, joints_in_words, known_arm, robot_named_like
 
 GRIP_SITE = "grip_site"
 """Name of the tcp of the robots at the table."""
+
+UNREAD = {
+    ".json": "JSON", ".jsonl": "JSON", ".yaml": "YAML", ".bag": "a rosbag", ".db3": "a rosbag", ".mcap": "a rosbag",
+    ".parquet": "Parquet", ".xlsx": "an Excel workbook", ".xls": "an Excel workbook", ".ods": "a spreadsheet",
+    ".mat": "a file of MATLAB", ".pkl": "a pickle", ".pickle": "a pickle", ".zip": "an archive", ".gz": "compressed",
+}  # fmt: skip
+"""Kinds of files that hold recordings and are not read, by their ending."""
 
 
 class ImportRequest(NamedTuple):
@@ -67,19 +75,27 @@ def imported(raw: Path, request: ImportRequest) -> tuple[Demonstration, tuple[st
     Raises:
         BadDemonstration, UnknownName, BadConfig: the file or an option cannot be used; one line says why.
     """
+    request = request._replace(robot=robot_named_like(request.robot))
     arm = known_arm(request.robot)
     recording = _recording(raw, request, arm)
-    notes = list(recording.notes)
-    if recording.joints is not None and arm is not None and raw.suffix.lower() != ".npz":
+    notes = [note for note in (about_robot(request.robot), *recording.notes) if note]
+    if recording.is_computed or raw.suffix.lower() in ENDINGS:  # tables with poses were looked at with their units
+        notes.append(reach_in_words(recording.hand, recording.time, arm, "m", blame_of(raw, "poses")))
+    if recording.joints is not None and arm is not None:
         _check_dof(raw, arm, recording.joints)
-        agreement = checked_against_joints(raw, "poses", recording.hand, joints_path(arm, recording.joints))
-        notes.append(f"the path of the hand {agreement}")
+        poses = None if recording.is_computed else recording.hand
+        notes.append(f"the joints are {joints_in_words(raw, recording.joints, recording.time, arm, poses)}")
+    notes += gaps_in_words(recording.hand, recording.time)
     if request.places:
         recording = _placed(recording, request.places)
     _check_sizes(recording, request.sizes)
     task, names, about_task = _task(request.task)
-    known = bool(recording.objects or recording.fixtures or request.segments)
-    is_bare_pour = task == "pour" and not known
+    lacks_glasses = task == "pour" and not (recording.objects or recording.fixtures)
+    # a motion with the glass in the hand from the start: poses of a real Panda's hand, and nothing else
+    is_bare_pour = lacks_glasses and not request.segments and recording.gripper is None and recording.joints is None
+    if lacks_glasses and not is_bare_pour:
+        reason = "needs the glasses source and target, and none was recorded: say with --place where they stood"
+        raise BadDemonstration(raw, "task pour", reason)
     demonstration = demonstration_of(
         recording,
         name=request.name,
@@ -93,16 +109,15 @@ def imported(raw: Path, request: ImportRequest) -> tuple[Demonstration, tuple[st
         sizes=request.sizes,
     )
     if is_bare_pour:
-        placed = pour_from_poses(demonstration)
-        demonstration = placed.demonstration
-        for glass, top in zip(("source", "target"), placed.stands, strict=True):
-            place = " ".join(f"{value:.3f}" for value in top)
-            notes.append(f"the {glass}, which was not recorded, is taken to stand at {place} m")
-    return demonstration, (*notes, *about_task)
+        demonstration, about_glasses = _with_glasses(demonstration)
+        notes += about_glasses
+    return demonstration, (*notes, *about_task, *_left_over(demonstration, recording))
 
 
 def _recording(raw: Path, request: ImportRequest, arm: Arm | None) -> Recording:
     kind, table = raw.suffix.lower(), request.table
+    if kind in UNREAD and raw.is_file():
+        raise BadDemonstration(raw, "file", f"is {UNREAD[kind]}, which is not read: write it as .csv, .npy or .npz")
     if request.episode and kind not in ENDINGS:
         raise BadConfig(COMMAND_LINE, "--demo", f"is for HDF5 files ({', '.join(ENDINGS)})")
     if kind not in (".npz", *ENDINGS):
@@ -110,10 +125,11 @@ def _recording(raw: Path, request: ImportRequest, arm: Arm | None) -> Recording:
     if kind in ENDINGS:
         _refuse_others(table, ("hand",), "an HDF5 file")
         return recording_from_hdf5(raw, request.episode, table.hand)
-    _refuse_others(table, ("ignored",), "a teleoperation")
+    _refuse_others(table, ("ignored", "time_unit"), "a teleoperation")
     if arm is None:
         raise BadConfig(COMMAND_LINE, "--robot", f"{request.robot!r} is no shipped robot, and {raw} holds joints alone")
-    return recording_from_teleoperation(raw, arm, tcp_frame=GRIP_SITE, ignored=table.ignored)
+    table.check_words()
+    return recording_from_teleoperation(raw, arm, tcp_frame=GRIP_SITE, ignored=table.ignored, time_unit=table.time_unit)
 
 
 def _refuse_others(table: TableRequest, used: tuple[str, ...], kind: str) -> None:
@@ -124,12 +140,23 @@ def _refuse_others(table: TableRequest, used: tuple[str, ...], kind: str) -> Non
             raise BadConfig(COMMAND_LINE, options.get(key, f"--{key}"), f"is for tables of poses, not for {kind}")
 
 
-def known_arm(robot: str) -> Arm | None:
-    """Return the arm of a shipped robot at the table; None of another robot."""
-    from ...envs.scene.robots import robot_named
-    from ...envs.scene.scene import robot_arm
+def _with_glasses(demonstration: Demonstration) -> tuple[Demonstration, list[str]]:
+    """Return a pouring without glasses with them, and where they are taken to stand, a line each."""
+    placed = pour_from_poses(demonstration)
+    notes = []
+    for glass, top in zip(("source", "target"), placed.stands, strict=True):
+        place = " ".join(f"{value:.3f}" for value in top)
+        notes.append(f"the {glass}, which was not recorded, is taken to stand at {place} m")
+    return placed.demonstration, notes
 
-    return robot_arm(robot_named(robot)) if robot in ROBOTS else None
+
+def _left_over(demonstration: Demonstration, recording: Recording) -> list[str]:
+    """Return a note about what the hand does after the last motion, if it moves on."""
+    last, lengths = max((each.stop for each in demonstration.segments), default=-1), recording.hand.lengths()
+    if last < 0 or lengths[-1] - lengths[last] <= LEAVING:
+        return []
+    since, end = (recording.time[k] - recording.time[0] for k in (last, -1))
+    return [f"what the hand does after the last motion, from {since:.1f} to {end:.1f} s, is part of no motion"]
 
 
 def _check_dof(raw: Path, arm: Arm, joints: np.ndarray) -> None:

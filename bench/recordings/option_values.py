@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from ...configs import BadConfig
 from ...planner import Pose
-from ..console import COMMAND_LINE
+from ..console import COMMAND_LINE, check_writable
 
+LARGEST = 2.0
+"""Length [m] of an object beyond which its size is asked about: it may be in mm."""
 UNIT_QUATERNION = 1e-3
 """Largest deviation of a quaternion's norm from 1 that counts as rounding."""
+
+
+def check_output(raw: Path, output: Path) -> None:
+    """Refuse an output that would replace the recording itself, or that is no .npz file.
+
+    Args:
+        raw: the recording.
+        output: the demonstration to write.
+
+    Raises:
+        BadConfig: one line says why.
+    """
+    if output.suffix.lower() != ".npz":
+        raise BadConfig(COMMAND_LINE, "--output", f"{output} does not end in .npz, as a demonstration does")
+    if output.exists() and raw.exists() and output.samefile(raw):
+        raise BadConfig(COMMAND_LINE, "--output", f"{output} is the recording itself, which would be lost")
+    check_writable("--output", output)
 
 
 def sizes_of(options: Sequence[str]) -> dict[str, np.ndarray]:
     """Return the sizes (3,) [m] by object of options like "cup=0.06,0.06,0.1".
 
     Raises:
-        BadConfig: another form, or sizes that are not positive.
+        BadConfig: another form, or sizes that are not positive, or of no object that a hand moves.
     """
     found = {}
     for option in options:
@@ -27,6 +47,8 @@ def sizes_of(options: Sequence[str]) -> dict[str, np.ndarray]:
             raise BadConfig(
                 COMMAND_LINE, "--size", f"{option!r} is not positive; expected lengths, widths, heights [m]"
             )
+        if numbers.max() > LARGEST:
+            raise BadConfig(COMMAND_LINE, "--size", f"{option!r} is {numbers.max():g} m long: in mm? sizes are in m")
         found[name] = numbers
     return found
 

@@ -7,35 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from ...planner import Demonstration, Pose, Segment
+from ...planner.errors import BadDemonstration
 from ...planner.geometry.dualquat import screw_parameters
 from ...planner.imitation.demonstration_files import UNITS
-from ...planner.imitation.segmentation import gripper_events
-from ...planner.recordings.kinematic_check import checked_against_joints, joints_path
-from .importing import known_arm
+from ...planner.skills.describe import described
+from ...planner.skills.infer import infer_skill
+from .robot_checks import robot_facts
 
 DIRECTIONS = {"up": (0, 0, 1), "down": (0, 0, -1), "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0)}
 STRAIGHT = 0.02
 """Turn [rad] below which a motion is called straight: its pitch would be a matter of noise."""
-
-
-def joints_in_words(path: Path, demonstration: Demonstration) -> str:
-    """Return how a demonstration's joints agree with its poses, in words.
-
-    Args:
-        path: of its file, for messages.
-        demonstration: the demonstration.
-
-    Raises:
-        BadDemonstration: they contradict each other.
-    """
-    joints = demonstration.joint_positions
-    if joints is None:
-        return "not recorded"
-    arm = known_arm(demonstration.robot)
-    if arm is None or joints.shape[1] != arm.dof:
-        return f"{joints.shape[1]} recorded, not compared with the poses: {demonstration.robot} has no model here"
-    agreement = checked_against_joints(path, "poses", demonstration.path, joints_path(arm, joints))
-    return f"{joints.shape[1]} recorded; the path {agreement}"
 
 
 def pointing(pose: Pose) -> str:
@@ -83,7 +64,7 @@ def facts(path: Path, demonstration: Demonstration) -> list[tuple[str, str]]:
         ("length", f"{seconds}, {demo.path.lengths()[-1]:.2f} m (screw)"),
         ("tool", f"{demo.tcp_frame}, units {UNITS}; it points {pointing(first)} at first"),
         ("speed", speeds(demo)),
-        ("joints", joints_in_words(path, demo)),
+        *robot_facts(path, demo),
         (
             "gripper",
             "not recorded" if demo.gripper is None else "closed at first" if demo.gripper[0] > 0 else "open at first",
@@ -94,12 +75,6 @@ def facts(path: Path, demonstration: Demonstration) -> list[tuple[str, str]]:
     found += [("others", f"joints {', '.join(demo.other_joints)}")] if demo.other_joints else []
     found += [("commands", "the commanded path is recorded, too")] if demo.commanded is not None else []
     return [*found, ("licence", demo.licence)]
-
-
-def _gripper(demo: Demonstration) -> str:
-    if demo.gripper is None:
-        return "not recorded"
-    return f"{'closed' if demo.gripper[0] > 0 else 'open'} at first, changes {len(gripper_events(demo.gripper))} times"
 
 
 def _object(demo: Demonstration, name: str) -> str:
@@ -146,3 +121,20 @@ def segment_lines(demonstration: Demonstration, segment: Segment) -> list[str]:
         *lines,
         f"screw: {np.linalg.norm(last.position - first.position):.3f} m, turn of {np.degrees(screw.angle):.1f} deg",
     ]
+
+
+def skill_lines(demonstration: Demonstration) -> list[str]:
+    """Return the skill that a demonstration shows, in words, a line for each phase and what is known about it.
+
+    Shapes of things are unknown here: a task makes references and symmetries sharper.
+    """
+    if not demonstration.object_paths and not demonstration.other_joints:
+        return []
+    try:
+        skill = infer_skill(demonstration)
+    except BadDemonstration as error:
+        return [f"skill: none is found: {error.key} {error.reason}"]
+    lines = ["skill, by what moved (in a task the shapes of things make it sharper):"]
+    for line, below in described(skill):
+        lines += [f"  {line}", *(f"    {text}" for text in below)]
+    return [*lines, *(f"  {note}" for note in skill.notes)]

@@ -12,7 +12,7 @@ from ...baselines.own_policy import is_own
 from ...configs import BadConfig, Grid, RunConfig
 from ...configs.errors import unknown_key
 from ...planner.errors import BadDemonstration
-from ..recordings.summary import joints_in_words
+from ..recordings.robot_checks import robot_facts
 from ..task_table import TASKS
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
             raise BadDemonstration(file, "segment_names", reason)
     _check_content(file, demonstration, PROGRAMS[cell.task])
     if not is_shipped(file):  # those are compared by a test
-        _check_joints(file, demonstration)
+        _check_robot(file, demonstration)
     return demonstration
 
 
@@ -169,6 +169,6 @@ def _check_content(file: Path, demonstration: Demonstration, program: Any) -> No
 
 
 @lru_cache(maxsize=32)
-def _check_joints(file: Path, demonstration: Demonstration) -> None:
-    """Refuse a demonstration whose joints contradict its poses; of each one this is looked at once."""
-    joints_in_words(file, demonstration)
+def _check_robot(file: Path, demonstration: Demonstration) -> None:
+    """Refuse a demonstration that its robot cannot have made; of each one this is looked at once."""
+    robot_facts(file, demonstration)

@@ -23,6 +23,9 @@ LEAVING = 0.05
 HOLDS = 0.15
 """Largest distance [m] of the tcp from the origin of an object that it takes."""
 
+CARRYING = ("carry", "transfer", "insert")
+"""Motions of tasks that have something in the hand, so that they do not end with a grasp."""
+
 
 class SegmentRequest(NamedTuple):
     """Wishes of a user about a motion; None is found from the recording.
@@ -102,7 +105,7 @@ def segments_of(
     if requests and not whole and len(requests) > len(pieces):
         raise BadDemonstration(recording.file, "segments", f"{len(requests)} are named; {_found(recording, pieces)}")
     if not requests and names:
-        if not len(names) <= len(pieces) <= len(names) + 1:
+        if not _serves(recording, pieces, len(names)) or _ends_with_grasp(recording, pieces, names):
             wanted = f"the task needs {', '.join(names)}; {_found(recording, pieces)}"
             example = (
                 f"--segment {names[0]}=0s:{recording.time[pieces[0][1]] - recording.time[0] if pieces else 1:.1f}s"
@@ -121,11 +124,27 @@ def segments_of(
     return tuple(segments)
 
 
+def _serves(recording: Recording, pieces: list[tuple[int, int]], count: int) -> bool:
+    """Return whether so many motions are found; one more may be the hand's way home after its last release."""
+    leaves = len(pieces) == count + 1 and count > 0 and _action(recording, pieces[count - 1][1]) == "open"
+    return len(pieces) == count or leaves
+
+
+def _ends_with_grasp(recording: Recording, pieces: list[tuple[int, int]], names: Sequence[str]) -> bool:
+    """Return whether a motion that carries something by its name would end with the grasp."""
+    carried = [piece for name, piece in zip(names, pieces, strict=False) if name in CARRYING]
+    return any(_action(recording, stop) == "close" for _, stop in carried)
+
+
 def _found(recording: Recording, pieces: list[tuple[int, int]]) -> str:
     start = recording.time[0]
-    spans = [f"{recording.time[a] - start:.1f} to {recording.time[b] - start:.1f} s" for a, b in pieces]
+    ends = {"close": ", then the gripper closes", "open": ", then it opens", "none": ""}
+    spans = [
+        f"{recording.time[a] - start:.1f} to {recording.time[b] - start:.1f} s{ends[_action(recording, b)]}"
+        for a, b in pieces
+    ]
     return f"found {'is' if len(spans) == 1 else 'are'} {len(spans)} motion{'s'[: len(spans) != 1]}" + (
-        f" ({', '.join(spans)})" if spans else ""
+        f" ({'; '.join(spans)})" if spans else ""
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
@@ -9,27 +10,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadDemonstration, UnknownName
-from .column_names import Meaning, meaning_of
-from .recording import QUATERNIONS
+from .column_names import UNITS, Meaning, is_hand, meanings_of, unknown_unit
+from .pose_columns import ORIENTATIONS, Parts, PoseColumns, TableRequest, pose_columns
+from .recording import blame_of
 from .text_table import TextTable
 
-POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+WHY = {
+    "unknown": "says nothing that is known",
+    "counter": "counts, but not the rows",
+    "rate": "is neither a position nor a command of the gripper",
+    "command": "is a command, not what was measured",
+    "count": "is one of {count} numbers, which are no pose (a position and a quaternion are 7)",
+}
+"""Why a column is not read, by the kind of its meaning."""
 
-
-class PoseColumns(NamedTuple):
-    """Columns of a pose.
-
-    Attributes:
-        position: columns of x, y, z.
-        unit: of the position, as the names say; "" if they say none.
-        quaternion: columns of w, x, y, z, or of four numbered components.
-        order: of the components: "wxyz" if the names give the components, "" if they are only numbered.
-    """
-
-    position: tuple[int, ...]
-    unit: str
-    quaternion: tuple[int, ...]
-    order: str
+NUMBERS = {"time": "seconds, or other numbers with --time-unit,", "gripper": "numbers, like 0 open and 1 closed,"}
+"""Numbers that are read in the place of words, by the kind of a column's meaning."""
 
 
 class Roles(NamedTuple):
@@ -41,6 +37,7 @@ class Roles(NamedTuple):
         time: column of the stamps, and its unit; a second one of nanoseconds if there is one.
         joints: columns of the arm's joints, in order, and their unit.
         gripper: column of the gripper's signal; None if there is none.
+        gripper_end: its state at its largest value, "open" or "closed", as the names say; "" if they do not.
         fingers: columns of the fingers' joints.
         notes: what is left out, a line each.
     """
@@ -52,44 +49,106 @@ class Roles(NamedTuple):
     joints: tuple[int, ...]
     joint_unit: str
     gripper: int | None
+    gripper_end: str
     fingers: tuple[int, ...]
     notes: tuple[str, ...]
 
 
-def named(table: TextTable, names: Sequence[str], quaternion: str) -> TextTable:
+def named(table: TextTable, request: TableRequest) -> TextTable:
     """Return a table with names for its columns: those given, its own, or those of a usual layout without a header.
 
     Args:
         table: the table.
-        names: given by the user; empty: none.
-        quaternion: order of the quaternion's columns that the user names, "" if none.
+        request: what its user says.
 
     Raises:
         BadDemonstration: another number of names, or columns that nothing names.
     """
     width = len(table.columns)
-    if names:
+    if request.columns:
+        names = [name for word in request.columns for name in _counted(word)]
         if len(names) != width:
             raise BadDemonstration(table.path, "--columns", f"names {len(names)}; the file has {width} columns")
         double = sorted({name for name in names if names.count(name) > 1})
         if double:
             raise BadDemonstration(table.path, "--columns", f"names {double[0]!r} twice")
+        _check_names(table, names)
         notes = ("the header is replaced by --columns",) if table.names else ()
         return table._replace(names=tuple(names), notes=(*table.notes, *notes))
     if table.names:
         return table
+    found, why = _usual(table, width, request)
+    said = f"columns are taken as {' '.join(found)}, {why}"
+    return table._replace(names=tuple(found), notes=(*table.notes, said))
+
+
+def _check_names(table: TextTable, names: list[str]) -> None:
+    """Refuse names of --columns that call another part of a pose what the header calls one."""
+    parts = ("position", "quaternion", "time")
+    for name, own, new, old in zip(names, table.names, meanings_of(names), meanings_of(table.names), strict=False):
+        is_part = new.kind in parts and old.kind in parts and not (new.axis + old.axis).isdigit()
+        if is_part and (new.kind, new.axis) != (old.kind, old.axis):
+            reason = f"calls {name!r} what the header calls {own!r}; rename it in the file if the header is wrong"
+            raise BadDemonstration(table.path, "--columns", reason)
+
+
+def _counted(word: str) -> list[str]:
+    """Return the names that a word stands for: O_T_EE_0..15 are sixteen."""
+    found = re.fullmatch(r"(.*?)(\d+)\.\.(\d+)", word)
+    return [f"{found[1]}{k}" for k in range(int(found[2]), int(found[3]) + 1)] if found else [word]
+
+
+def _usual(table: TextTable, width: int, request: TableRequest) -> tuple[list[str], str]:
+    """Return names for the columns of a table without a header, and why."""
+    blame, place = blame_of(table.path, "table"), ["x", "y", "z"]
+    if width in (12, 16):
+        return [f"pose_{k}" for k in range(width)], "matrices, for lack of a header"
+    if width == 6 and request.rotation:
+        return [f"pose_{k}" for k in range(6)], "as said"
+    if width == 6:
+        reason = "a position and angles? say --rotation; or joints? say --columns q1..6"
+        raise blame(f"has 6 columns and no header: {reason}")
     if width not in (7, 8):
         reason = f"has {width} columns and no header: name them, like --columns time,x,y,z,qw,qx,qy,qz,gripper"
-        raise BadDemonstration(table.path, "table", reason)
+        raise blame(reason)
     is_tum = width == 8 and table.separator is None
-    order = quaternion or ("xyzw" if is_tum else "wxyz" if width == 7 else "")
+    order = request.quaternion or ("xyzw" if is_tum else "")
     if not order:
-        reason = "has 8 columns and no header: time and a pose? say --quaternion wxyz or xyzw"
-        raise BadDemonstration(table.path, "table", reason)
-    own = ("x", "y", "z", *(f"q{letter}" for letter in order))
-    words = "as in files of TUM" if is_tum and not quaternion else "as said" if quaternion else "for lack of a header"
-    found = own if width == 7 else ("time", *own)
-    return table._replace(names=found, notes=(*table.notes, f"columns are taken as {' '.join(found)}, {words}"))
+        what = "time and a pose" if width == 8 else "a position and a quaternion"
+        raise blame(f"has {width} columns and no header: {what}? say --quaternion wxyz or xyzw")
+    why = "as said" if request.quaternion else "as in files of TUM"
+    own = [*place, *(f"q{letter}" for letter in order)]
+    return (own if width == 7 else ["time", *own]), why
+
+
+def rows_of_frame(table: TextTable, frame: str) -> tuple[TextTable, bool]:
+    """Return the rows of one frame of a table whose rows are of several, and whether the name of a frame chose them.
+
+    Args:
+        table: with names.
+        frame: name that the user gives to the hand.
+
+    Raises:
+        BadDemonstration: there are several frames, and the user names none of them.
+    """
+    for name, column in zip(table.names, table.columns, strict=True):
+        if not isinstance(column, tuple) or not re.search(r"frame|body", name.lower()) or len(set(column)) < 2:
+            continue
+        frames = sorted(set(column))
+        if frame not in frames:
+            shown = ", ".join(frames[:8])
+            reason = f"column {name!r} names several frames, {shown}: say by --hand whose rows are the hand's"
+            raise BadDemonstration(table.path, "table", reason)
+        rows = np.array([each == frame for each in column])
+        columns = tuple(
+            tuple(word for word, is_row in zip(each, rows, strict=True) if is_row)
+            if isinstance(each, tuple)
+            else each[rows]
+            for each in table.columns
+        )
+        note = f"of {len(rows)} rows, the {int(rows.sum())} are read in which {name!r} is {frame!r}"
+        return table._replace(columns=columns, lines=table.lines[rows], notes=(*table.notes, note)), True
+    return table, False
 
 
 def roles_of(table: TextTable, ignored: Sequence[str], hand: str) -> Roles:
@@ -107,26 +166,16 @@ def roles_of(table: TextTable, ignored: Sequence[str], hand: str) -> Roles:
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in table.names):
             raise UnknownName("column to ignore", pattern, table.names)
-    meanings, notes = {}, []
-    for k, name in enumerate(table.names):
-        column, meaning = table.columns[k], meaning_of(name)
-        if any(fnmatchcase(name, pattern) for pattern in ignored):
-            notes.append(f"column {name!r} is left out, as said")
-        elif isinstance(column, tuple):
-            notes.append(_about_words(table, name, column))
-        elif meaning.kind == "counter" and (len(column) == 1 or (np.diff(column) == 1.0).all()):
-            notes.append(f"column {name!r} counts the rows and is left out")
-        elif meaning.kind in ("unknown", "counter"):
-            reason = (
-                f"{name!r} says nothing that is known; leave it out with --ignore {name!r}, or name it by --columns"
-            )
-            raise BadDemonstration(table.path, "header", reason)
-        else:
-            meanings[k] = meaning
+    meanings, notes = _meanings(table, ignored)
     poses = _poses(table, meanings)
-    own = _hand(table, poses, hand)
-    found, time_notes = _time(table, meanings)
     joints = sorted((int(m.axis), k) for k, m in meanings.items() if m.kind == "joint")
+    own = _hand(table, poses, hand, bool(joints))
+    notes += [f"the hand's pose is that of {own!r}"] if own and not hand else []
+    mine = poses.pop(own, None)
+    for name in [name for name in poses if hand and is_hand(name)]:
+        poses.pop(name)
+        notes.append(f"the pose of {name or 'the hand without a name'!r}, another hand than {hand!r}, is left out")
+    found, time_notes = _time(table, meanings)
     _check_unique(table, [str(number) for number, _ in joints], "joint")
     grippers = [k for k, m in meanings.items() if m.kind == "gripper"]
     if len(grippers) > 1:
@@ -136,21 +185,63 @@ def roles_of(table: TextTable, ignored: Sequence[str], hand: str) -> Roles:
         )
     units = {meanings[k].unit for _, k in joints}
     if len(units) > 1:
-        raise BadDemonstration(table.path, "header", f"joints have the units {', '.join(sorted(units))}")
+        raise BadDemonstration(
+            table.path, "header", f"joints have the units {', '.join(each or 'none' for each in sorted(units))}"
+        )
     return Roles(
-        hand=poses.pop(own) if own in poses else None,
-        objects=poses,
+        hand=mine,
+        objects={name or "hand": columns for name, columns in poses.items()},
         time=found,
         time_unit=meanings[found[0]].unit if len(found) == 1 else "",
         joints=tuple(k for _, k in joints),
         joint_unit=units.pop() if units else "",
         gripper=grippers[0] if grippers else None,
+        gripper_end=meanings[grippers[0]].axis if grippers else "",
         fingers=tuple(k for k, m in meanings.items() if m.kind == "finger"),
         notes=(*notes, *time_notes),
     )
 
 
-def _about_words(table: TextTable, name: str, words: tuple[str, ...]) -> str:
+def _meanings(table: TextTable, ignored: Sequence[str]) -> tuple[dict[int, Meaning], list[str]]:
+    """Return the meaning of each column that is read, and why others are not."""
+    meanings, notes = {}, []
+    for k, (name, meaning) in enumerate(zip(table.names, meanings_of(table.names), strict=True)):
+        column = table.columns[k]
+        if any(fnmatchcase(name, pattern) for pattern in ignored):
+            notes.append(f"column {name!r} is left out, as said")
+        elif isinstance(column, tuple):
+            notes.append(_about_words(table, name, column, meaning.kind))
+        elif unknown_unit(name):
+            known = ", ".join(dict.fromkeys(UNITS.values()))
+            raise BadDemonstration(table.path, "header", f"{name!r} is in {unknown_unit(name)}; known units: {known}")
+        elif meaning.kind == "counter" and (len(column) == 1 or (np.diff(column) == 1.0).all()):
+            notes.append(f"column {name!r} counts the rows and is left out")
+        elif meaning.kind in WHY:
+            why = WHY[meaning.kind].format(count=meaning.axis)
+            reason = f"{name!r} {why}; leave it out with --ignore {name!r}, or name it by --columns"
+            raise BadDemonstration(table.path, "header", reason)
+        else:
+            meanings[k] = meaning
+    return _settled(meanings), notes
+
+
+def _settled(meanings: dict[int, Meaning]) -> dict[int, Meaning]:
+    """Decide whether q0 to q3 are a quaternion, which only a position without another orientation lacks, or joints."""
+    kinds = {(meaning.owner, meaning.kind) for meaning in meanings.values()}
+    out = {}
+    for k, meaning in meanings.items():
+        if meaning.kind == "q":
+            has_turn = any((meaning.owner, kind) in kinds for kind in ORIENTATIONS)
+            is_turn = ((meaning.owner, "position") in kinds and not has_turn) or meaning.owner != ""
+            meaning = meaning._replace(kind="quaternion") if is_turn else Meaning("joint", axis=meaning.axis)
+        out[k] = meaning
+    return out
+
+
+def _about_words(table: TextTable, name: str, words: tuple[str, ...], kind: str) -> str:
+    if kind in NUMBERS and (kind != "gripper" or len(set(words)) > 1):
+        reason = f"column {name!r} holds words like {words[0]!r}; {NUMBERS[kind]} are read: convert it"
+        raise BadDemonstration(table.path, f"line {table.lines[0]}", reason)
     if len(set(words)) > 1:
         row = next(k for k, word in enumerate(words) if word != words[0])
         reason = f"column {name!r} holds words, {words[0]!r} and {words[row]!r}; leave it out with --ignore {name!r}"
@@ -160,50 +251,34 @@ def _about_words(table: TextTable, name: str, words: tuple[str, ...]) -> str:
 
 def _poses(table: TextTable, meanings: dict[int, Meaning]) -> dict[str, PoseColumns]:
     """Return the columns of the pose of each owner."""
-    parts: dict[str, dict[tuple[str, str], int]] = {}
+    parts: dict[str, Parts] = {}
     for k, meaning in meanings.items():
-        if meaning.kind in ("position", "quaternion"):
-            mine = parts.setdefault(meaning.owner, {})
-            key = (meaning.kind, meaning.axis)
-            if key in mine:
-                reason = f"{table.names[mine[key]]!r} and {table.names[k]!r} are both the {key[1]} of one {key[0]}"
+        if meaning.kind == "position" or meaning.kind in ORIENTATIONS:
+            mine = parts.setdefault(meaning.owner, {}).setdefault(meaning.kind, {})
+            if meaning.axis in mine:
+                both = f"{table.names[mine[meaning.axis]]!r} and {table.names[k]!r}"
+                reason = f"{both} are both the {meaning.axis} of one {meaning.kind}"
                 raise BadDemonstration(table.path, "header", reason)
-            mine[key] = k
-    return {owner: _pose(table, owner, mine, meanings) for owner, mine in parts.items()}
+            mine[meaning.axis] = k
+    return {owner: pose_columns(table, owner, mine, meanings) for owner, mine in parts.items()}
 
 
-def _pose(table: TextTable, owner: str, mine: dict[tuple[str, str], int], meanings: dict[int, Meaning]) -> PoseColumns:
-    def columns(kind: str, *layouts: str) -> tuple[tuple[int, ...], str]:
-        there = {axis for each, axis in mine if each == kind}
-        for layout in layouts:
-            if there == set(layout):
-                return tuple(mine[kind, axis] for axis in layout), layout
-        absent = [axis for axis in layouts[0] if axis not in there]
-        whose = f" of {owner!r}" if owner else ""
-        names = ", ".join(f"q{axis}" if kind == "quaternion" else axis for axis in absent)
-        have = ", ".join(table.names)
-        raise BadDemonstration(table.path, "header", f"the pose{whose} lacks {names}; there are: {have}")
-
-    position, _ = columns("position", "xyz", "012")
-    quaternion, layout = columns("quaternion", "wxyz", "0123")
-    units = {meanings[k].unit for k in position}
-    if len(units) > 1:
-        raise BadDemonstration(table.path, "header", f"x, y and z have the units {', '.join(sorted(units)) or '-'}")
-    return PoseColumns(position, units.pop(), quaternion, "" if layout == "0123" else layout)
-
-
-def _hand(table: TextTable, poses: dict[str, PoseColumns], hand: str) -> str:
-    """Return the owner of the pose that is the hand's."""
+def _hand(table: TextTable, poses: dict[str, PoseColumns], hand: str, has_joints: bool) -> str:
+    """Return the owner of the pose that is the hand's; "" also if none is, and joints say where the hand is."""
     if hand:
         if hand not in poses:
             raise UnknownName("hand among the poses", hand, [name for name in poses if name])
         return hand
-    if "" in poses or not poses:
+    hands = [name for name in poses if is_hand(name)]
+    if len(hands) < 2 and ("" in poses or has_joints):
         return ""
-    if len(poses) == 1:
-        return next(iter(poses))
-    names = ", ".join(poses)
-    raise BadDemonstration(table.path, "header", f"which pose is the hand's? say so with --hand; there are: {names}")
+    if len(poses) == 1 or len(hands) == 1:
+        return next(iter(hands or poses))
+    if not poses:
+        return ""
+    names, others = ", ".join(name or "the one without a name" for name in hands or poses), max(hands or poses)
+    say = f"say so with --hand, or leave others out with --ignore '{others}_*'"
+    raise BadDemonstration(table.path, "header", f"which pose is the hand's? {say}; there are: {names}")
 
 
 def _time(table: TextTable, meanings: dict[int, Meaning]) -> tuple[tuple[int, ...], list[str]]:
@@ -228,38 +303,5 @@ def _time(table: TextTable, meanings: dict[int, Meaning]) -> tuple[tuple[int, ..
 def _check_unique(table: TextTable, numbers: list[str], what: str) -> None:
     double = sorted({number for number in numbers if numbers.count(number) > 1})
     if double:
-        raise BadDemonstration(table.path, "header", f"two columns are the {what} {double[0]}")
-
-
-def check_order(table: TextTable, columns: PoseColumns, quaternion: str) -> str:
-    """Return the order of a quaternion's columns as they stand.
-
-    Args:
-        table: the table.
-        columns: of the pose.
-        quaternion: order that the user names, "" if none.
-
-    Raises:
-        BadDemonstration: the names contradict the user, or nothing gives the order.
-    """
-    if columns.order:
-        letters = "".join("wxyz"[columns.quaternion.index(k)] for k in sorted(columns.quaternion))
-        if quaternion and letters != quaternion:
-            names = " ".join(table.names[k] for k in sorted(columns.quaternion))
-            reason = f"{names} is the order {letters}; --quaternion {quaternion} contradicts it"
-            raise BadDemonstration(table.path, "header", reason)
-        return letters
-    if not quaternion:
-        reason = "numbers the quaternion's components: say --quaternion wxyz or xyzw"
+        reason = f"two columns are the {what} {double[0]}; leave one out by --ignore"
         raise BadDemonstration(table.path, "header", reason)
-    return quaternion
-
-
-def components(columns: PoseColumns, order: str) -> list[int]:
-    """Return the columns of w, x, y, z.
-
-    Args:
-        columns: of the pose.
-        order: of its numbered components, see `check_order`.
-    """
-    return list(columns.quaternion) if columns.order else [columns.quaternion[k] for k in QUATERNIONS[order]]

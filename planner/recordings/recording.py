@@ -46,6 +46,7 @@ class Recording:
         objects: n poses of each object that was recorded.
         fixtures: pose of each thing that stood still.
         commanded: n poses that the tcp was sent to; None if not recorded.
+        is_computed: the hand's poses were not recorded, but computed from the joints.
         notes: what was understood of the file, decided or left out, a line each.
     """
 
@@ -59,4 +60,5 @@ class Recording:
     objects: Mapping[str, PosePath] = field(default_factory=dict)
     fixtures: Mapping[str, Pose] = field(default_factory=dict)
     commanded: PosePath | None = None
+    is_computed: bool = False
     notes: tuple[str, ...] = ()

@@ -17,21 +17,28 @@ from ..errors import BadDemonstration, UnknownName
 from ..geometry.pose import Pose, PosePath
 from ..imitation.npz_arrays import numbers, read_arrays, texts, unit_poses
 from ..robot.arm import Arm
+from .column_names import GRIPPER, UR_JOINTS
 from .gripper_signal import gripper_command
 from .kinematic_check import checked_against_joints, joints_path
 from .recording import Recording, blame_of
+from .time_stamps import seconds_of
 
 REQUIRED = ("t", "q", "actions")
 PREFIXES = ("obj_", "ee_", "fix_")
 KEYS = f"{', '.join(REQUIRED)}, joint_names, obj_NAME, fix_NAME, ee_NAME"
 STEP, TURN = 0.05, 0.5
 """Motion [m] and rotation [rad] of an action 1 of robosuite's OSC_POSE, added to the tcp's pose then, in world axes."""
+MAKES = {
+    "panda": "Panda", "franka": "Panda", "fr3": "Panda", "iiwa": "IIWA", "lbr": "IIWA", "kuka": "IIWA",
+    "sawyer": "Sawyer", "jaco": "Jaco", "ur5e": "UR5e", "kinova3": "Kinova3", "gen3": "Kinova3", "xarm7": "XArm7",
+}  # fmt: skip
+"""Words of joints' names that say whose joints they are: the robot's name."""
 OSC_POSE = 7
 """Numbers of an action of OSC_POSE, with the gripper's."""
 
 
 def recording_from_teleoperation(
-    path: str | Path, arm: Arm, *, tcp_frame: str = "grip_site", ignored: Sequence[str] = ()
+    path: str | Path, arm: Arm, *, tcp_frame: str = "grip_site", ignored: Sequence[str] = (), time_unit: str = ""
 ) -> Recording:
     """Read a teleoperation. The hand's path is that of the joints, by the arm's forward kinematics.
 
@@ -40,6 +47,7 @@ def recording_from_teleoperation(
         arm: the recorded robot, with its recorded base pose.
         tcp_frame: name of the arm's tcp.
         ignored: patterns of keys to leave out.
+        time_unit: of the stamps: "s", "ms", "us" or "ns"; "": what the numbers say.
 
     Raises:
         BadDemonstration: the file or one of its entries is invalid, or the joints contradict the recorded poses.
@@ -50,7 +58,8 @@ def recording_from_teleoperation(
     _check_keys(path, arrays)
     time, q, actions = (numbers(path, key, arrays[key], width) for key, width in (("t", 1), ("q", 2), ("actions", 2)))
     _check_counts(path, arrays, len(time))
-    joints, others = _joints(path, arrays, q, arm)
+    time, about_time = seconds_of(time, time_unit, blame_of(path, "t"))
+    joints, others, about_order = _joints(path, arrays, q, arm)
     hand = joints_path(arm, joints)
     gripper, about_gripper = gripper_command(actions[:, -1], None, blame_of(path, "actions"))
     objects = {_name(key): _poses(path, key, arrays[key]) for key in arrays if key.startswith("obj_")}
@@ -74,7 +83,8 @@ def recording_from_teleoperation(
         objects=objects,
         fixtures=fixtures,
         commanded=commanded_path(hand, actions[:, :6]) if is_osc else None,
-        notes=(about_gripper, *notes),
+        is_computed=True,
+        notes=tuple(note for note in (about_time, about_gripper, about_order, *notes) if note),
     )
 
 
@@ -143,8 +153,8 @@ def _poses(path: Path, key: str, value: np.ndarray) -> PosePath:
 
 def _joints(
     path: Path, arrays: dict[str, np.ndarray], q: np.ndarray, arm: Arm
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the joints (n, dof) of the arm, and (n,) of each other joint by its name."""
+) -> tuple[np.ndarray, dict[str, np.ndarray], str]:
+    """Return the joints (n, dof) of the arm, (n,) of each other joint by its name, and a note if they were sorted."""
     if q.shape[1] < arm.dof:
         raise BadDemonstration(path, "q", f"has {q.shape[1]} columns; the {arm.name} has {arm.dof} joints")
     names = [f"joint{k + 1}" for k in range(q.shape[1])]
@@ -153,4 +163,36 @@ def _joints(
         if len(names) != q.shape[1] or len(set(names)) < len(names):
             reason = f"are {len(names)}, {len(set(names))} of them different; q has {q.shape[1]} columns"
             raise BadDemonstration(path, "joint_names", reason)
-    return q[:, : arm.dof], {names[k]: q[:, k] for k in range(arm.dof, q.shape[1])}
+    mine = _arm_columns(names, arm.dof) or list(range(arm.dof))
+    for name in (names[k] for k in mine):
+        makes = {MAKES[word] for word in re.split(r"[^a-z0-9]+", name.lower()) if word in MAKES}
+        if makes and arm.name.lower() not in {make.lower() for make in makes}:
+            reason = f"{name!r} is a joint of the {makes.pop()} by its name, not of the {arm.name}: say --robot"
+            raise BadDemonstration(path, "joint_names", reason)
+    others = {name: q[:, k] for k, name in enumerate(names) if k not in mine}
+    sorted_ = (
+        f"q is sorted by joint_names, {names[mine[0]]} to {names[mine[-1]]}" if mine != list(range(arm.dof)) else ""
+    )
+    return q[:, mine], others, sorted_
+
+
+def _arm_columns(names: list[str], dof: int) -> list[int]:
+    """Return the columns of an arm's joints in order, by the numbers or words in their names; [] if they say none."""
+    chains: dict[str, dict[int, int]] = {}
+    for k, name in enumerate(names):
+        low = name.lower()
+        if GRIPPER & set(re.split(r"[^a-z]+", low)):
+            continue
+        word = next((j for j, each in enumerate(UR_JOINTS, 1) if re.search(rf"{each}(_joint)?$", low)), 0)
+        number = re.search(r"\d+$", low)
+        if word:
+            stem, place = low.rsplit(UR_JOINTS[word - 1], 1)[0], word
+        elif number:
+            stem, place = low[: number.start()], int(number[0])
+        else:
+            continue
+        chains.setdefault(stem, {})[place] = k
+    whole = [chain for chain in chains.values() if set(chain) in (set(range(dof)), set(range(1, dof + 1)))]
+    # of two arms the first one is recorded first
+    whole.sort(key=lambda chain: min(chain.values()))
+    return [whole[0][place] for place in sorted(whole[0])] if whole else []

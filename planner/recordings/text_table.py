@@ -11,12 +11,13 @@ import numpy as np
 
 from ..errors import BadDemonstration
 from ..imitation.npz_arrays import MAX_BYTES
+from .column_names import UNITS
 
 COMMENTS = ("#", "%")
 """Marks at the beginning of a line that is no row; the last such line before the rows may be a header."""
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 DECIMAL_POINT = re.compile(r"[+-]?\d*\.\d*([eE][+-]?\d+)?")
-SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", None: "spaces"}
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", None: "spaces"}
 
 
 class TextTable(NamedTuple):
@@ -41,6 +42,19 @@ class TextTable(NamedTuple):
     def label(self, k: int) -> str:
         """Return the name of a column for messages."""
         return f"column {self.names[k]!r}" if self.names else f"column {k + 1}"
+
+    def numbers(self, k: int) -> np.ndarray:
+        """Return a column (n,) of finite numbers.
+
+        Raises:
+            BadDemonstration: one is not finite; the error names the column, the index and the line.
+        """
+        column = np.asarray(self.columns[k], dtype=np.float64)
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            where = f"line {self.lines[bad[0]]}" if self.path.suffix != ".npy" else f"row {bad[0]}"
+            raise BadDemonstration(self.path, self.label(k), f"is not finite at index {bad[0]} ({where})")
+        return column
 
 
 class _Row(NamedTuple):
@@ -73,6 +87,8 @@ def _from_npy(path: Path) -> TextTable:
     except (ValueError, EOFError, OSError) as error:
         raise BadDemonstration(path, "table", f"cannot be read: {str(error).splitlines()[0]}") from None
     names = array.dtype.names or ()
+    if not names and array.ndim == 3 and array.shape[1:] in ((4, 4), (3, 4)):
+        array = array.reshape(len(array), -1)
     if names and array.ndim == 1:
         columns = [array[name] for name in names]
     elif not names and array.ndim == 2 and array.dtype.kind in "fiu":
@@ -126,7 +142,7 @@ def _table(
     names = () if header is None else tuple(name.strip() for name in header)
     double = sorted({name for name in names if names.count(name) > 1})
     if double:
-        raise BadDemonstration(path, "header", f"names {double[0]!r} twice")
+        raise BadDemonstration(path, "header", f"names {double[0]!r} twice; name all columns by --columns")
     table = TextTable(path, names, (), np.array([row.line for row in rows]), separator)
     columns = tuple(_column(table, k, [row.fields[k] for row in rows], comma) for k in range(width))
     notes = [f"columns are separated by {SEPARATORS[separator]}" + (", decimals by commas" if comma else "")]
@@ -145,7 +161,7 @@ def _decoded(path: Path) -> str:
 
 def _separator(line: str) -> str | None:
     """Return what separates the fields of a row; None for spaces."""
-    for mark in (";", "\t"):
+    for mark in (";", "\t", "|"):
         if mark in line:
             return mark
     words = line.split()
@@ -177,6 +193,8 @@ def _decimal_comma(path: Path, rows: list[_Row], separator: str | None) -> bool:
 
 
 def _number(field: str, comma: bool) -> float | None:
+    if field.lower() in ("true", "false"):
+        return float(field.lower() == "true")
     try:
         return float(field.replace(",", ".") if comma else field)
     except ValueError:
@@ -195,11 +213,7 @@ def _holds_units(fields: list[str], width: int) -> bool:
 def _as_unit(field: str) -> str:
     """Return the unit that a field names, like "mm" of "[mm]", else ""."""
     word = field.strip("[]()").strip()
-    return word if re.fullmatch(r"|".join(UNIT_WORDS), word) else ""
-
-
-UNIT_WORDS = ("m", "cm", "mm", "s", "ms", "us", "ns", "rad", "deg", "-")
-"""Words that a second line of a header may hold."""
+    return word if word == "-" or word.lower() in UNITS else ""
 
 
 def _column(table: TextTable, k: int, fields: list[str], comma: bool) -> np.ndarray | tuple[str, ...]:

@@ -25,7 +25,8 @@ from onedemo.planner.errors import BadDemonstration
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.imitation.demonstration_files import read_demonstration, save_demonstration
 from onedemo.planner.recordings.import_recording import demonstration_of
-from onedemo.planner.recordings.pose_table import TableRequest, recording_from_table
+from onedemo.planner.recordings.pose_columns import TableRequest
+from onedemo.planner.recordings.pose_table import recording_from_table
 
 RECORDING = Path(__file__).parents[4] / "shared" / "data" / "panda_kinesthetic_pouring.npy"
 needs_recording = pytest.mark.skipif(not RECORDING.exists(), reason="the recording is not shipped")
@@ -126,12 +127,14 @@ def test_a_recording_that_never_tilts_is_refused(tmp_path):
     quarter = Pose.from_yaw([0.0, 0.0, 0.0], -0.5 * np.pi)
     np.save(file, np.array([(level_hand(np.array([0.4, 0.1 * k, 0.3]), 0.0) @ quarter).vector for k in range(5)]))
     with pytest.raises(BadDemonstration, match="tilted by 0 deg at most; pouring begins at 92"):
-        pour_from_poses(demonstration_of(recording_from_table(file, TableRequest(rate=10.0)), name="upright"))
+        pour_from_poses(
+            demonstration_of(recording_from_table(file, TableRequest(rate=10.0, quaternion="wxyz")), name="upright")
+        )
 
 
 @needs_recording
 def test_the_motion_that_a_person_showed_a_real_panda_pours(tmp_path):
-    recording = recording_from_table(RECORDING, TableRequest(rate=100.0, units="cm"))
+    recording = recording_from_table(RECORDING, TableRequest(rate=100.0, units="cm", quaternion="wxyz"))
     raw = demonstration_of(recording, name="real", licence="MIT")
     placed = pour_from_poses(raw)
     save_demonstration(placed.demonstration, tmp_path / "pour_real.npz")

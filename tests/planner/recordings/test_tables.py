@@ -9,7 +9,8 @@ from helpers.strategies import assert_same_pose, for_all, st
 from onedemo.planner.errors import BadDemonstration, OneDemoError
 from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.imitation.tsia import screw_path
-from onedemo.planner.recordings.pose_table import TableRequest, recording_from_table
+from onedemo.planner.recordings.pose_columns import TableRequest
+from onedemo.planner.recordings.pose_table import recording_from_table
 from onedemo.planner.recordings.text_table import read_table
 
 MOTION = screw_path(
@@ -17,8 +18,9 @@ MOTION = screw_path(
     Pose.from_position_quaternion([0.1, 0.3, 0.2], [0.2, 0.8, 0.4, 0.4]),
     0.02,
 )
-CUP = MOTION.with_tool(Pose.from_yaw([0.0, 0.02, 0.1], 0.3))
 GRIP = np.where(np.arange(len(MOTION)) > 9, 1.0, -1.0)
+HELD = MOTION.with_tool(Pose.from_yaw([0.0, 0.02, 0.1], 0.3))
+CUP = PosePath(np.array([HELD.dqs[max(k, 10)] for k in range(len(MOTION))]))
 EPOCH = 1_403_638_522
 STYLES = {
     "plain": ("{o}x {o}y {o}z", "{o}qw {o}qx {o}qy {o}qz"),
@@ -116,6 +118,7 @@ def rows(header: str = "", mark: str = ",", order: tuple[int, ...] = (0, 1, 2, 3
     return "\n".join([*([header] if header else []), *lines]) + "\n"
 
 
+HEADER = "x,y,z,qw,qx,qy,qz"
 XYZW = (0, 1, 2, 4, 5, 6, 3)
 
 
@@ -129,22 +132,27 @@ XYZW = (0, 1, 2, 4, 5, 6, 3)
         (rows("x,y,z,a,b,c,d"), {}, "'a' says nothing that is known; leave it out with --ignore 'a'"),
         (rows("x,y,z,qw,qx,qy,qy"), {}, "header: names 'qy' twice"),
         (rows("x,y,z,quat_0,quat_1,quat_2,quat_3"), {}, "numbers the quaternion's components: say --quaternion"),
-        ("nan" + rows()[11:], {}, r"column 'x': is not finite at index 0 \(line 1\)"),
+        ("nan" + rows()[11:], {"quaternion": "wxyz"}, r"column 'x': is not finite at index 0 \(line 1\)"),
         ("n/a" + rows()[11:], {}, "line 1: column 1: 'n/a' is not a number"),
         (rows("x,y,z,qw,qx,qy,qz") + "1,2,oops,1,0,0,0\n", {}, "line 10: column 'z': 'oops' is not a number"),
         (rows("x,y,z,qw,qx,qy,qz") + "1,,3,1,0,0,0\n", {}, "line 10: column 'y': is empty"),
         (rows("x,y,z,qw,qx,qy,qz") + "1,2,3,1,0,0\n", {}, "line 10: has 6 fields; the header has 7"),
-        (rows() + "0,0,0,2,0,0,0\n", {}, "the quaternion at index 8 has norm 2"),
-        (rows(), {"rate": None}, "rate: is needed, since no column holds time stamps"),
-        (rows(), {"rate": 0.0}, "rate: 0.0 is not a positive number"),
-        (rows(), {"rate": float("nan")}, "rate: nan is not a positive number"),
-        (rows(), {"units": "inch"}, "unknown unit 'inch'; known: m, cm, mm"),
-        (rows(), {"quaternion": "zyxw"}, "unknown quaternion order 'zyxw'; known: wxyz, xyzw"),
-        (rows(), {"ignored": ("vel*",)}, r"unknown column to ignore 'vel\*'; known: x, y"),
-        (rows(), {"columns": ("x", "y")}, "--columns: names 2; the file has 7 columns"),
-        (rows(), {"time_unit": "ms"}, "--time-unit: is given, and no column holds time stamps"),
-        (rows(), {"closed": 1.0}, "--gripper-closed: is given, and no column is of the gripper"),
-        (rows(count=1), {}, r"has 1 sample\(s\)"),
+        (rows(HEADER) + "0,0,0,2,0,0,0\n", {}, "the quaternion at index 8 has norm 2"),
+        (rows(HEADER), {"rate": None}, "rate: is needed, since no column holds time stamps"),
+        (rows(HEADER), {"rate": 0.0}, "rate: 0.0 is not a positive number"),
+        (rows(HEADER), {"rate": float("nan")}, "rate: nan is not a positive number"),
+        (rows(HEADER), {"units": "inch"}, "unknown unit 'inch'; known: m, cm, mm"),
+        (rows(HEADER), {"quaternion": "zyxw"}, "unknown quaternion order 'zyxw'; known: wxyz, xyzw"),
+        (rows(HEADER), {"ignored": ("vel*",)}, r"unknown column to ignore 'vel\*'; known: x, y"),
+        (rows(HEADER), {"columns": ("x", "y")}, "--columns: names 2; the file has 7 columns"),
+        (rows(HEADER), {"time_unit": "ms"}, "--time-unit: is given, and no column is of a time stamp"),
+        (rows(HEADER), {"closed": 1.0}, "--gripper-closed: is given, and no column is of a gripper"),
+        (rows(count=1), {"quaternion": "wxyz"}, r"has 1 sample\(s\)"),
+        (rows(), {}, "has 7 columns and no header: a position and a quaternion. say --quaternion wxyz or xyzw"),
+        (rows("x [inch],y [inch],z [inch],qw,qx,qy,qz"), {}, "'x .inch.' is in inch; known units: m, cm, mm"),
+        (rows("x_µm,y_µm,z_µm,qw,qx,qy,qz"), {}, "'x_µm' is in µm; known units"),
+        (rows("x,y,z_mm,qw,qx,qy,qz"), {}, "x, y and z have the units none, mm"),
+        (rows(HEADER), {"columns": ("x", "y", "z", "qx", "qy", "qz", "qw")}, "calls 'qx' what the header calls 'qw'"),
         ("", {}, "table: has no rows"),
         ("x,y,z,qw,qx,qy,qz\n", {}, "has a header, and no rows"),
         ("1,2,3\n1,2,3\n", {}, "has 3 columns and no header: name them"),
@@ -223,9 +231,37 @@ def test_words_that_change_are_left_out_only_if_the_user_says_so(tmp_path):
     assert "column 'state' is left out, as said" in found.notes
 
 
+@pytest.mark.parametrize("name, words", [("time", "seconds, or other"), ("gripper", "numbers, like 0 open and 1")])
+def test_words_in_the_place_of_numbers_are_not_to_be_thrown_away(name, words, tmp_path):
+    text = "\n".join([f"{name},{HEADER}", *(f"{'ab'[k % 2]},{csv(MOTION.vectors[k])}" for k in range(8))])
+    with pytest.raises(BadDemonstration, match=f"column '{name}' holds words like 'a'; {words}.* are read: convert it"):
+        recording_from_table(written(tmp_path, text), TableRequest(rate=50.0))
+
+
+def test_rows_of_several_frames_are_those_of_the_frame_that_the_user_names(tmp_path):
+    lines = [f"{csv(MOTION.vectors[k // 2])},{('tool0', 'flange')[k % 2]}" for k in range(16)]
+    file = written(tmp_path, "\n".join([f"{HEADER},child_frame_id", *lines]))
+    for ignored in ((), ("child_frame_id",)):
+        with pytest.raises(
+            BadDemonstration, match="'child_frame_id' names several frames, flange, tool0: say by --hand"
+        ):
+            recording_from_table(file, TableRequest(rate=50.0, ignored=ignored))
+    found = recording_from_table(file, TableRequest(rate=50.0, hand="tool0"))
+    assert_same_pose(found.hand.dqs, MOTION.dqs[:8], 1e-9)
+    assert "of 16 rows, the 8 are read in which 'child_frame_id' is 'tool0'" in found.notes
+
+
+def test_an_array_of_matrices_is_a_table(tmp_path):
+    matrices = np.array([pose.matrix for pose in MOTION])
+    for name, array in (("rows", matrices), ("columns", matrices.transpose(0, 2, 1)), ("upper", matrices[:, :3])):
+        np.save(tmp_path / f"{name}.npy", array)
+        found = recording_from_table(tmp_path / f"{name}.npy", TableRequest(rate=50.0))
+        assert_same_pose(found.hand.dqs, MOTION.dqs, 1e-9)
+
+
 def test_arrays_of_numpy_are_tables_too(tmp_path):
     np.save(tmp_path / "plain.npy", MOTION.vectors)
-    plain = recording_from_table(tmp_path / "plain.npy", TableRequest(rate=50.0))
+    plain = recording_from_table(tmp_path / "plain.npy", TableRequest(rate=50.0, quaternion="wxyz"))
     assert_same_pose(plain.hand.dqs, MOTION.dqs, 1e-12)
     named = np.zeros(len(MOTION), dtype=[(name, "f8") for name in ("z", "y", "x", "qx", "qy", "qz", "qw")])
     for name, column in zip(("x", "y", "z", "qw", "qx", "qy", "qz"), MOTION.vectors.T, strict=True):
@@ -260,5 +296,5 @@ def test_any_bytes_are_a_table_or_one_line(tmp_path_factory, data):
 def test_the_tool_is_where_the_user_says(tmp_path):
     np.save(tmp_path / "flange.npy", MOTION.vectors)
     tool = Pose.from_position_quaternion([0.0, 0.0, 0.1034], [0.9238795325112867, 0.0, 0.0, -0.3826834323650898])
-    found = recording_from_table(tmp_path / "flange.npy", TableRequest(rate=50.0, tool=tool))
+    found = recording_from_table(tmp_path / "flange.npy", TableRequest(rate=50.0, quaternion="wxyz", tool=tool))
     assert_same_pose(found.hand.dqs, PosePath(MOTION.dqs).with_tool(tool).dqs, 1e-9)

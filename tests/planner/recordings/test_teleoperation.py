@@ -126,3 +126,32 @@ def test_a_key_is_left_out_if_the_user_says_so(tmp_path):
     for key in ("t", "q", "actions"):
         with pytest.raises(BadDemonstration, match=f"{key}: is missing; a recording holds: t, q, actions, joint_names"):
             read(tmp_path, {name: value for name, value in arrays.items() if name != key})
+
+
+def test_joints_in_another_order_are_sorted_by_their_names(tmp_path):
+    arrays = teleoperation()
+    order = [7, 2, 0, 1, 9, 3, 4, 6, 5, 8]
+    found = read(tmp_path, {**arrays, "q": arrays["q"][:, order], "joint_names": arrays["joint_names"][order]})
+    np.testing.assert_array_equal(found.joints, arrays["q"][:, :7])
+    assert set(found.other_joints) == {"finger1", "finger2", "drawer_slide"}
+    np.testing.assert_array_equal(found.other_joints["drawer_slide"], arrays["q"][:, 9])
+    assert "q is sorted by joint_names, robot0_joint1 to robot0_joint7" in found.notes
+    assert not any("sorted" in note for note in read(tmp_path, arrays).notes)
+
+
+def test_joints_of_another_robot_are_refused(tmp_path):
+    names = np.array([f"iiwa_joint_{k}" for k in range(1, 8)] + ["finger1", "finger2", "drawer_slide"])
+    with pytest.raises(BadDemonstration, match="'iiwa_joint_1' is a joint of the IIWA by its name, not of the Panda"):
+        read(tmp_path, {**teleoperation(), "joint_names": names})
+
+
+def test_stamps_in_another_unit_are_asked_about_and_converted(tmp_path):
+    arrays = teleoperation()
+    assert any("time stamps are in s: 20 Hz" in note for note in read(tmp_path, arrays).notes)
+    with pytest.raises(BadDemonstration, match="t: has steps of 1, which are no seconds"):
+        read(tmp_path, {**arrays, "t": np.arange(12.0)})
+    with pytest.raises(BadDemonstration, match=r"ns \(20 Hz\)"):
+        read(tmp_path, {**arrays, "t": np.round(1e9 * arrays["t"]).astype(np.int64)})
+    since = np.int64(1_714_550_400) * 10**9 + np.round(1e9 * arrays["t"]).astype(np.int64)
+    for found in (read(tmp_path, {**arrays, "t": since}), read(tmp_path, {**arrays, "t": since}, time_unit="ns")):
+        np.testing.assert_allclose(found.time, arrays["t"], atol=1e-6)
