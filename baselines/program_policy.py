@@ -9,7 +9,7 @@ import numpy as np
 
 from ..envs import TaskDescription
 from ..planner import Demonstration, MotionSettings, Pose
-from ..planner.errors import BadOption, PlanFailed, UnknownName
+from ..planner.errors import BadOption, PlanFailed
 from .motion.settings import ProgramSettings
 from .motion.tool_frame import ToolFrameMotion
 from .policy import EpisodePolicy, Observation, PolicyReport
@@ -19,10 +19,12 @@ from .programs.dual_arm_executor import DualArmExecutor
 from .programs.pour import PourProgram
 from .programs.reach import ReachProgram
 from .programs.shelve import ShelveProgram
+from .programs.skill_program import SkillProgram
 from .programs.stack import StackProgram
+from .programs.task_skills import skill_of
 from .programs.world_model import WorldModel
 
-Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram
+Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram | SkillProgram
 PROGRAMS = {
     "stack": StackProgram,
     "pour": PourProgram,
@@ -33,7 +35,7 @@ PROGRAMS = {
     "tilt_pour": PourProgram,
     "insert_one": ShelveProgram,
 }
-"""Program of each task."""
+"""Programs written for a task; in any other one, the program is found in the demonstration."""
 CONTROL_MODE = "joint_velocity"
 
 
@@ -78,20 +80,20 @@ class ProgramPolicy(EpisodePolicy):
         tool: `tcp_from_tool` of another frame of the hand, whose motion is planned; None: the tcp.
 
     Raises:
-        UnknownName: the task has no program.
+        BadDemonstration, UnknownName: no program was written for the task, and none is found in the demonstration; see
+            `skill_of`.
         BadOption: another control mode or time step.
     """
 
     def __init__(
         self, task: TaskDescription, demonstration: Demonstration, settings: ProgramSettings, tool: Pose | None = None
     ):
-        if task.name not in PROGRAMS:
-            raise UnknownName("task with a program", task.name, PROGRAMS)
         if task.control_mode != CONTROL_MODE:
             reason = f"{task.control_mode!r}, but the arm is moved by joint speeds: make the environment with"
             raise BadOption("control_mode", f"{reason} control_mode={CONTROL_MODE!r}")
         self.settings = settings = at_rate(settings, task.control_dt)
         self.task, self.demonstration = settings.visible_part(task), demonstration
+        self.skill = None if task.name in PROGRAMS else skill_of(demonstration, task)
         self.motion_method = settings.motion_method if tool is None else ToolFrameMotion(settings.motion_method, tool)
 
     def begin(self, observation: Observation) -> Episode:
@@ -108,6 +110,8 @@ class ProgramPolicy(EpisodePolicy):
             observation,
             motion_method=self.motion_method,
         )
+        if self.skill is not None:
+            return Episode(hand, SkillProgram(task, self.skill, settings, hand))
         return Episode(hand, PROGRAMS[task.name](task, self.demonstration, settings, hand))
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:

@@ -22,14 +22,15 @@ def check(
 ) -> None:
     """Validate a demonstration and print its content.
 
-    Prints duration, samples, the segments with the screw motion of each, source, licence, and warnings about anything
-    unusual. Exits with code 2 and one line if the file cannot be used.
+    Prints duration, samples, the segments with the screw motion of each, the skill that is found where objects or
+    joints of the scene were recorded, source, licence, and warnings about anything unusual. Exits with code 2 and one
+    line if the file cannot be used.
 
     Example: onedemo demo check stack
     """
     from ..planner import read_demonstration
     from ..planner.imitation.demonstration_warnings import warnings_of
-    from .recordings.summary import facts, segment_lines
+    from .recordings.summary import facts, segment_lines, skill_lines
 
     path = demonstration_path(file)
     demo = read_demonstration(path)
@@ -44,6 +45,8 @@ def check(
         out.print(f"  {segment.name}", style="bold")
         for line in segment_lines(demo, segment):
             out.print(f"    {line}")
+    for line in skill_lines(demo):
+        out.print(line)
     warnings = warnings_of(demo)
     for warning in warnings:
         out.print(labeled("warning", "yellow", warning))
@@ -71,13 +74,23 @@ def import_(
     quaternion: Annotated[
         str, typer.Option(help="Order of its columns, if nothing names them: wxyz, xyzw.", rich_help_panel=TABLES)
     ] = "",
+    rotation: Annotated[
+        str,
+        typer.Option(
+            help="What three numbers of an orientation are: rotvec, rpy, or axes, fixed (xyz) or moving (ZYX).",
+            rich_help_panel=TABLES,
+        ),
+    ] = "",
+    matrix: Annotated[
+        str, typer.Option(help="Order of a matrix's numbers: rows or columns.", rich_help_panel=TABLES)
+    ] = "",
     rate: Annotated[
         float | None, typer.Option(help="Samples per second, without time stamps.", rich_help_panel=TABLES)
     ] = None,
     time_unit: Annotated[str, typer.Option(help="Of time stamps: s, ms, us, ns.", rich_help_panel=TABLES)] = "",
-    angles: Annotated[str, typer.Option(help="Of joints: rad or deg.", rich_help_panel=TABLES)] = "",
+    angles: Annotated[str, typer.Option(help="Of joints and orientations: rad or deg.", rich_help_panel=TABLES)] = "",
     columns: Annotated[
-        str, typer.Option(help="Names of the columns: time,x,y,z,qw,qx,qy,qz,gripper", rich_help_panel=TABLES)
+        str, typer.Option(help="Names of the columns: time,x,y,z,qw,qx,qy,qz,gripper or q1..7", rich_help_panel=TABLES)
     ] = "",
     ignore: Annotated[
         Texts, typer.Option(help="Column or key to leave out, like 'vel_*'; repeatable.", rich_help_panel=TABLES)
@@ -124,14 +137,16 @@ def import_(
     """
     from ..planner import save_demonstration
     from ..planner.recordings.cuts import parsed_segment
-    from ..planner.recordings.pose_table import TableRequest
+    from ..planner.recordings.pose_columns import TableRequest
     from .recordings.importing import ImportRequest, imported
-    from .recordings.option_values import places_of, sizes_of, tool_of
+    from .recordings.option_values import check_output, places_of, sizes_of, tool_of
 
-    check_writable("--output", output)
+    check_output(raw, output)
     table = TableRequest(
         units=units,
         quaternion=quaternion,
+        rotation=rotation,
+        matrix=matrix,
         rate=rate,
         time_unit=time_unit,
         angles=angles,

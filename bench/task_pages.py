@@ -15,6 +15,8 @@ CLIP_SECONDS = 8.0
 """Duration of a clip; the playback speed follows from it."""
 CLIP_FRAMES = 96
 CLIP_QUALITY = 55
+WITHOUT_PROGRAM = {"robosuite": "onedemo/Robosuite-v0"}
+"""Environments by the name of their page that no shipped program does: they are listed, and have no clip."""
 MOST_PICTURES = 300
 """Largest number of pictures rendered of an episode that takes its whole time limit."""
 
@@ -28,6 +30,8 @@ def list_tasks() -> None:
         table.add_column(head, no_wrap=head == "id")
     for name, facts in TASKS.items():
         table.add_row(facts.id, summary_of(facts.id), f"{IDS[facts.id].seconds:g}", f"onedemo run {name}")
+    for identifier in WITHOUT_PROGRAM.values():
+        table.add_row(identifier, summary_of(identifier), f"{IDS[identifier].seconds:g}", "none")
     console().print(table, soft_wrap=False)
 
 
@@ -45,17 +49,19 @@ def summary_of(identifier: str) -> str:
 
 
 def page_text(task: str) -> str:
-    """Return the Markdown page of a task's environment: its docstring below its clip."""
-    facts = TASKS[task]
-    summary, _, rest = str(inspect.getdoc(environment_class(facts.id))).partition("\n\n")
+    """Return the Markdown page of a task's environment: its docstring below its clip, if it has one."""
+    identifier = TASKS[task].id if task in TASKS else WITHOUT_PROGRAM[task]
+    summary, _, rest = str(inspect.getdoc(environment_class(identifier))).partition("\n\n")
     parts = [
-        f"# {facts.id}",
+        f"# {identifier}",
         " ".join(summary.split()),
-        f"![The planner at work on {facts.id}]({task}.webp)",
-        f'```python\nimport gymnasium as gym\nimport onedemo.envs\n\nenv = gym.make("{facts.id}")\n```',
+        f"![The planner at work on {identifier}]({task}.webp)",
+        f'```python\nimport gymnasium as gym\nimport onedemo.envs\n\nenv = gym.make("{identifier}")\n```',
         rest,
         f"One run of the planner on it: `onedemo run {task}`.",
     ]
+    if task in WITHOUT_PROGRAM:
+        del parts[5], parts[2]
     return "\n\n".join(parts) + "\n"
 
 
@@ -73,13 +79,13 @@ def write_pages(folder: Path, *, clips: bool) -> list[Path]:
         BadConfig: a file cannot be written.
     """
     written = []
-    for task in TASKS:
+    for task in (*TASKS, *WITHOUT_PROGRAM):
         page = folder / f"{task}.md"
         with writing("--write", page):
             folder.mkdir(parents=True, exist_ok=True)
             page.write_text(page_text(task), encoding="utf-8")
         written.append(page)
-        if clips:
+        if clips and task in TASKS:
             written.append(write_clip(task, folder / f"{task}.webp"))
     return written
 

@@ -32,12 +32,13 @@ IDS = {
     "onedemo/Shelve-v0": Id("onedemo.envs.shelve.shelve_env:ShelveEnv", 90.0),
     "onedemo/Pour-v0": Id("onedemo.envs.pour.pour_env:PourEnv", 40.0),
     "onedemo/BimanualPour-v0": Id("onedemo.envs.pour.bimanual_pour_env:BimanualPourEnv", 40.0),
+    "onedemo/Robosuite-v0": Id("onedemo.envs.guests.robosuite_env:RobosuiteEnv", 60.0),
     "onedemo/Reach-v0": Id("onedemo.envs.stack.reach_env:ReachEnv", 7.5, 20),
     "onedemo/PlaceOne-v0": Id("onedemo.envs.stack.place_one_env:PlaceOneEnv", 7.5, 20),
     "onedemo/TiltPour-v0": Id("onedemo.envs.pour.tilt_pour_env:TiltPourEnv", 7.5, 20),
     "onedemo/InsertOne-v0": Id("onedemo.envs.shelve.insert_one_env:InsertOneEnv", 7.5, 20),
 }
-"""Environments by id; the last four are single motions of the other tasks, meant for training."""
+"""Environments by id; those of 7.5 s are single motions of the other tasks, meant for training."""
 
 
 WHOLE_COPIES = WrapperSpec("WholeCopies", "onedemo.envs.core.whole_copies:WholeCopies", {})

@@ -13,6 +13,7 @@ from .planner.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from .baselines.factory import make_policy as make_policy
+    from .baselines.programs.task_skills import skill_of as skill_of
     from .configs.demonstrations import load_demonstration as load_demonstration
     from .planner.errors import OneDemoError as OneDemoError
 
@@ -21,6 +22,7 @@ __all__ = [
     "__version__",
     "load_demonstration",
     "make_policy",
+    "skill_of",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take any name for known
@@ -28,6 +30,7 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
         __name__,
         {
             ".baselines.factory": ("make_policy",),
+            ".baselines.programs.task_skills": ("skill_of",),
             ".configs.demonstrations": ("load_demonstration",),
             ".planner.errors": ("OneDemoError",),
         },

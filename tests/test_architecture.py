@@ -18,9 +18,9 @@ LOWER = {
 ORDER = {
     "planner": """
         errors lazy_names deferred_imports ranges arrays jit columns strict_json geometry models robot collision fitting
-        control imitation recordings log escape safety judge planning reactive
+        control imitation skills recordings log escape safety judge planning reactive
     """,
-    "envs": "errors registration mujoco_library scene simulation core stack pour shelve",
+    "envs": "errors registration mujoco_library scene simulation core stack pour shelve guests",
     "configs": """
         errors shipped_files demonstrations dotted_keys strict_yaml dataclass_settings run_config
         learner_defaults grid learner_values train_config plan_scene_schema plan_scene
@@ -50,7 +50,7 @@ ENVS_MAY_USE |= {"planner.collision.proximity", "planner.control.inverse_kinemat
 SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
 READERS = {"planner/models/urdf_model.py", "planner/judge/geometry.py"}
 USERS = {
-    "robosuite": {"envs/scene/robosuite_model.py", "bench/perf/command.py"},
+    "robosuite": {"envs/scene/robosuite_model.py", "envs/guests/robosuite_task.py", "bench/perf/command.py"},
     "pinocchio": {*READERS, "bench/perf/peers.py", "bench/robot/urdf_solids.py"},
     "numba": {"planner/jit.py"},
     "mujoco": {"envs/mujoco_library.py"},

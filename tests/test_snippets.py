@@ -1,4 +1,4 @@
-"""README's snippets run as they stand, each alone, in an empty folder."""
+"""Snippets of the README and of the page on skills run as they stand, each alone, in an empty folder."""
 
 from __future__ import annotations
 
@@ -9,11 +9,16 @@ import sys
 import pytest
 from helpers.import_graph import ROOT
 
-SNIPPETS = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+PAGES = ("README.md", "docs/skills.md")
+SNIPPETS = [
+    snippet
+    for page in PAGES
+    for snippet in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+]
 
 
 def test_there_are_some():
-    assert len(SNIPPETS) >= 4
+    assert len(SNIPPETS) >= 6
 
 
 @pytest.mark.parametrize("number", range(len(SNIPPETS)))

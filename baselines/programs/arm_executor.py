@@ -9,7 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...planner import Arm, Body, Command, NextMotion, Plan, Pose, PosePath, ReactiveSettings, Shape, final_path
+from ...planner import (
+    Arm,
+    Body,
+    Command,
+    NextMotion,
+    Obstacle,
+    Plan,
+    Pose,
+    PosePath,
+    ReactiveSettings,
+    Shape,
+    final_path,
+)
 from ...planner.errors import PlanFailed
 from ...planner.reactive.command import DONE, ESCAPING, FAILED
 from ...planner.robot.joint_limits import near_limit
@@ -34,7 +46,7 @@ class _Held(NamedTuple):
     """The held object: index, shape, `tcp_from_object` at the grasp, and `tcp_from_object` as guarded."""
 
     index: int
-    shape: Shape
+    shape: Shape | Sequence[Obstacle]
     grasped: Pose
     guarded: Pose
 
@@ -100,7 +112,7 @@ class ArmExecutor:
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
         self._planner = self.motion_method.follower(self.arm, self._planner.body, self._planner.settings)
 
-    def hold(self, index: int, shape: Shape, tcp_from_object: Pose) -> None:
+    def hold(self, index: int, shape: Shape | Sequence[Obstacle], tcp_from_object: Pose) -> None:
         """Treat an object as part of the arm from now on, no longer as an obstacle.
 
         Args:
@@ -128,7 +140,7 @@ class ArmExecutor:
             raise PlanFailed("dropped", f"{self.world_model.name(self._held.index)} is not in the hand after the lift")
         return now
 
-    def body_with(self, shape: Shape, tcp_from_object: Pose) -> Body:
+    def body_with(self, shape: Shape | Sequence[Obstacle], tcp_from_object: Pose) -> Body:
         """Return the body with an object in the hand, named "held".
 
         Args:
@@ -147,17 +159,22 @@ class ArmExecutor:
         """Set the allowed contacts from now on: of "fingers" or "held" with a named object."""
         self.world_model.allow(contacts)
 
-    def choose(self, motion: MotionChoice, then: Callable[[int], MotionChoice] | None = None) -> ChosenMotion:
+    def choose(
+        self, motion: MotionChoice, then: Callable[[int], MotionChoice] | None = None, *, search: bool = True
+    ) -> ChosenMotion:
         """Return the best goal of a motion from here; see `goal_choice.choose`.
 
         Args:
             motion: the motion.
             then: returns the next motion by the index of the goal; None if there is none.
+            search: whether joint space is searched where nothing else leads to a goal.
 
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no goal can be reached.
         """
-        return choose(self.arm, self._planner.settings.plan, self.q, motion, then, self.motion_method)
+        plan = self._planner.settings.plan
+        plan = plan if search else replace(plan, search=None)
+        return choose(self.arm, plan, self.q, motion, then, self.motion_method)
 
     def departure_path(self, motion: MotionChoice) -> PosePath | None:
         """Return the departure of a motion from here; see `goal_choice.departure_path`."""

@@ -94,9 +94,10 @@ class WorldModel:
     def _standing(self, poses: np.ndarray, held: int | None) -> tuple[Obstacle, ...]:
         objects, furniture, margin = self._task.objects, self._task.furniture, self._margin
         obstacles_if_holding = [
-            Obstacle(each.shape, Pose.from_vector(pose), name=each.name, margin=margin)
+            replace(part, margin=margin)
             for k, (each, pose) in enumerate(zip(objects, poses, strict=False))
             if k != held
+            for part in each.at(Pose.from_vector(pose))
         ]
         for each, pose in zip(furniture, poses[len(objects) :], strict=True):
             obstacles_if_holding += [replace(part, margin=margin) for part in each.at(Pose.from_vector(pose))]

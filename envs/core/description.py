@@ -28,14 +28,20 @@ class TaskObject:
 
     Attributes:
         name: unique name.
-        shape: shape of the object, or its hull, centered on the object's frame.
+        shape: shape of the object, or its hull, in the object's frame; a hull need not be centered on it.
         yaw_symmetry: smallest yaw [rad] after which the object looks the same; 2 pi without symmetry, 0 for a round
             object.
+        parts: convex solids in the object's frame that the object consists of; (): its one shape.
     """
 
     name: str
     shape: Shape
     yaw_symmetry: float
+    parts: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self):
+        if not self.parts:
+            object.__setattr__(self, "parts", (Obstacle(self.shape, name=self.name),))
 
     @staticmethod
     def of(thing: FreeBody | Glass | Book) -> TaskObject:
@@ -54,10 +60,14 @@ class TaskObject:
             return (0.0,)
         return tuple(np.arange(round(2 * np.pi / self.yaw_symmetry)) * self.yaw_symmetry)
 
+    def at(self, pose: Pose) -> tuple[Obstacle, ...]:
+        """Return the solids in the world frame for a given pose of the object."""
+        return tuple(Obstacle(part.shape, pose @ part.pose, name=self.name) for part in self.parts)
+
 
 @dataclass(frozen=True, slots=True)
 class TaskFurniture:
-    """Furniture: fixed within an episode, possibly moved between episodes.
+    """Furniture: fixed within an episode, possibly moved between episodes, or a part that turns on a hinge.
 
     Attributes:
         name: unique name.
@@ -97,6 +107,8 @@ class TaskDescription:
         touching: pairs (body part, fixture) exempt from collision checks, such as a shoulder and the trunk it sits in.
         obstacles: largest number of obstacles, the length of `obstacle_active`.
         control_mode: meaning of an action; see the environment.
+        scene_joints: joints of the scene that are not the robot's, like a door's hinge, in the order of
+            `scene_joint_positions`.
     """
 
     name: str
@@ -112,3 +124,4 @@ class TaskDescription:
     touching: tuple[tuple[str, str], ...] = ()
     obstacles: int = 0
     control_mode: str = "joint_velocity"
+    scene_joints: tuple[str, ...] = ()

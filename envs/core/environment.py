@@ -16,7 +16,7 @@ from ...planner.errors import BadOption, UnknownName
 from ..errors import BadAction, NoRoom
 from ..scene.robot_description import robot_parts
 from ..scene.robots import Robot
-from ..scene.scene import OBSTACLE
+from ..scene.scene import OBSTACLE, CompiledScene, compiled_scene
 from ..scene.scene_objects import TABLE_HEIGHT, SceneSpec
 from ..simulation.moving_obstacles import ScheduledObstacle
 from ..simulation.render import TABLE_VIEW, Ghost, Renderer, View
@@ -68,6 +68,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         motions: largest motion index.
         more: task-specific entries of the observation.
         things: scene contents besides the robot.
+        scene: scene compiled elsewhere; None: that of the robot and the things.
         view: camera view.
 
     All environments share the other arguments and describe them in their docstrings.
@@ -93,6 +94,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         render_mode: str | None,
         control_frequency: int,
         arms: tuple[str, ...] | None = None,
+        scene: CompiledScene | None = None,
         view: View = TABLE_VIEW,
         more: dict[str, gym.spaces.Box] | None = None,
     ):
@@ -104,7 +106,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
             checked_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         self.render_mode = render_mode
         self.substeps = substeps_at(control_frequency)
-        self.sim = Simulation(robot, replace(things, obstacles=SLOTS), arms)
+        self.sim = Simulation.of(scene or compiled_scene(robot, replace(things, obstacles=SLOTS), arms))
         self.arms = tuple(index.arm for index in self.sim.scene.arms)
         self.metadata = {**METADATA, "render_fps": control_frequency}
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
@@ -115,7 +117,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         self._renderer: Renderer | None = None
         self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
         self._task = self._described(name, things)
-        widths, objects = self._task.gripper_width, len(things.objects)
+        widths, objects = self._task.gripper_width, len(self._task.objects)
         self.observation_space = space.observation_space(
             self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
         )
@@ -218,10 +220,9 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         if kind == "none":
             return ()
         task, motions = self.task, self._placement_motions(start)
-        things = []
-        for each, pose in zip(task.objects, start.objects, strict=True):
-            things.append(Obstacle(each.shape, Pose.from_vector(pose), name=each.name))
-        for each, pose in zip(task.furniture, start.furniture, strict=True):
+        things: list[Obstacle] = []
+        poses = (*start.objects, *start.furniture)
+        for each, pose in zip((*task.objects, *task.furniture), poses, strict=True):
             things += each.at(Pose.from_vector(pose))
         solids = [*task.fixtures, *things]
         stage = PlacementContext(

@@ -31,7 +31,7 @@ def static_shapes(model: mujoco.MjModel, geoms: Iterable[int]) -> tuple[Obstacle
     for geom in geoms:
         solid = model.geom_contype[geom] or model.geom_conaffinity[geom]
         if solid and model.body_weldid[model.geom_bodyid[geom]] == 0:
-            shape = _shape(model, int(geom))
+            shape = geom_shape(model, int(geom))
             if shape is not None:
                 matrix = np.eye(4)
                 matrix[:3, :3], matrix[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
@@ -40,12 +40,18 @@ def static_shapes(model: mujoco.MjModel, geoms: Iterable[int]) -> tuple[Obstacle
     return tuple(found)
 
 
-def _shape(model: mujoco.MjModel, geom: int) -> Shape | None:
-    """Return the shape of a geom from MuJoCo's half sizes; None for planes and specks."""
+def geom_shape(model: mujoco.MjModel, geom: int) -> Shape | None:
+    """Return the shape of a geom from MuJoCo's half sizes; None for planes and specks.
+
+    Args:
+        model: compiled model.
+        geom: index of the geom; of a mesh with too many corners only some are kept.
+    """
     known, kind = mujoco.mjtGeom, int(model.geom_type[geom])
     x, y, z = (float(size) for size in model.geom_size[geom])
     if kind == known.mjGEOM_MESH:
-        return Mesh(_corners(model, int(model.geom_dataid[geom])))
+        points = mesh_points(model, geom)
+        return Mesh(some_corners(points[hull_corners(points)]))
     if kind == known.mjGEOM_PLANE or max(x, y, z) < SPECK:
         return None
     if kind == known.mjGEOM_BOX:
@@ -55,11 +61,20 @@ def _shape(model: mujoco.MjModel, geom: int) -> Shape | None:
     return Sphere(x) if kind == known.mjGEOM_SPHERE else Capsule(x, 2.0 * y)
 
 
-def _corners(model: mujoco.MjModel, mesh: int) -> np.ndarray:
-    """Return the corners (n, 3) [m] of a mesh's hull; if too many, the farthest in evenly spread directions."""
+def mesh_points(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Return the vertices (n, 3) [m] of a geom's mesh, in the geom's frame.
+
+    Args:
+        model: compiled model.
+        geom: index of the geom.
+    """
+    mesh = int(model.geom_dataid[geom])
     first = int(model.mesh_vertadr[mesh])
-    points = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
-    corners = points[hull_corners(points)]
+    return model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
+
+
+def some_corners(corners: np.ndarray) -> np.ndarray:
+    """Return the corners (n, 3) of a hull; if too many for a shape, the farthest in evenly spread directions."""
     if len(corners) <= MAX_VERTICES:
         return corners
     k = np.arange(MAX_VERTICES)

@@ -1,4 +1,4 @@
-"""Model of a robot at a table with objects, built by robosuite; no other module uses robosuite.
+"""Model of a robot at a table with objects, built by robosuite.
 
 robosuite's own controllers cost six times the physics and track a path badly. Here every arm joint has MuJoCo's
 integrated-velocity servo: the control is a joint speed, whose integral is held by a stiff position servo; the links are

@@ -12,7 +12,7 @@ import numpy as np
 from ...planner import Body, body_from_mujoco
 from ...planner.errors import UnknownName
 from ...planner.robot.body import BODY, Hull
-from .robots import ROBOTS, Robot
+from .robots import ROBOTS, WITH_PANDA_GRIPPER, Robot
 from .scene import compiled_scene
 
 TABLE = Path(__file__).parents[1] / "assets" / "bodies.json"
@@ -45,10 +45,10 @@ def robot_body(robot: Robot, index: int = 0) -> Body:
     Raises:
         UnknownName: no body is shipped for this robot.
     """
-    table = json.loads(TABLE.read_text(encoding="utf-8"))
-    if robot.name not in table:
-        raise UnknownName("robot with a body", robot.name, table)
-    entry = table[robot.name][index]
+    table, name = json.loads(TABLE.read_text(encoding="utf-8")), _name(robot)
+    if name not in table:
+        raise UnknownName("robot with a body", name, table)
+    entry = table[name][index]
     hulls = [Hull(np.array(hull["corners"]), hull["rounding"]) for hull in entry.get("hulls", ())]
     pairs = entry.get("pairs")
     return Body(
@@ -61,9 +61,19 @@ def robot_body(robot: Robot, index: int = 0) -> Body:
 
 
 def table_text(robots: tuple[str, ...]) -> str:
-    """Fit all bodies anew; return the text of the shipped table, written by `make bodies`."""
-    table = {robot: [_entry(body) for body in fitted_bodies(ROBOTS[robot])] for robot in robots}
+    """Fit all bodies anew; return the text of the shipped table, written by `make bodies`.
+
+    It has the given robots, and those of them that hold a Panda's gripper on request once more with it.
+    """
+    every = [ROBOTS[robot] for robot in robots] + [WITH_PANDA_GRIPPER[robot] for robot in WITH_PANDA_GRIPPER]
+    table = {_name(robot): [_entry(body) for body in fitted_bodies(robot)] for robot in every}
     return json.dumps(table, indent=1) + "\n"
+
+
+def _name(robot: Robot) -> str:
+    """Return the name of a robot in the table."""
+    other = ROBOTS.get(robot.name, robot).gripper != robot.gripper
+    return f"{robot.name} {robot.gripper}" if other else robot.name
 
 
 def _entry(body: Body) -> dict[str, Any]:

@@ -32,10 +32,17 @@ class RobotParts(NamedTuple):
     touching: tuple[tuple[str, str], ...]
 
 
-def robot_parts(scene: CompiledScene) -> RobotParts:
-    """Return the bodies and fixtures of the robot in a scene."""
+def robot_parts(scene: CompiledScene, moved: np.ndarray | None = None) -> RobotParts:
+    """Return the bodies and fixtures of the robot in a scene.
+
+    Args:
+        scene: the scene.
+        moved: (3,) displacement [m] of the robot's base from its place at OneDemo's table; None: it stands there.
+    """
     robot, order = scene.robot, list(scene.robot.ready)
     bodies = tuple(robot_body(robot, order.index(index.side)) for index in scene.arms)
+    if moved is not None:
+        bodies = tuple(body.with_base_moved(moved) for body in bodies)
     idle = [
         capsule
         for index, q in zip(scene.parked, scene.parked_joints, strict=True)

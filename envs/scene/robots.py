@@ -7,7 +7,7 @@ Baxter and Sawyer, KUKA LBR iiwa 7 R800, Universal Robots UR5e, Kinova Gen3 and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -71,6 +71,8 @@ class Robot:
         """Pickle a supported robot by its name: it is the same everywhere."""
         if ROBOTS.get(self.name) is self:
             return robot_named, (self.name,)
+        if WITH_PANDA_GRIPPER.get(self.name) is self:
+            return robot_with_gripper, (self.name, self.gripper)
         return type(self), tuple(getattr(self, each.name) for each in fields(self))
 
     def check_grip(self, width: float, thing: str) -> None:
@@ -182,6 +184,12 @@ ROBOTS: dict[str, Robot] = {
     )
 }
 """Supported robots by robosuite's names."""
+WITH_PANDA_GRIPPER: dict[str, Robot] = {
+    "Sawyer": replace(ROBOTS["Sawyer"], grip=PANDA_GRIP[0], opening=PANDA_GRIP[1], gripper="PandaGripper")
+}
+"""One-armed robots that hold a Panda's gripper only on request."""
+OWN_GRIPPERS = {"Panda": "PandaGripper", "Sawyer": "RethinkGripper"}
+"""robosuite's names of the grippers that are a robot's own."""
 
 
 def robot_named(name: object) -> Robot:
@@ -193,6 +201,29 @@ def robot_named(name: object) -> Robot:
     if not isinstance(name, str) or name not in ROBOTS:
         raise UnknownName("robot", name, ROBOTS)
     return ROBOTS[name]
+
+
+def grippers_of(robot: Robot) -> tuple[str, ...]:
+    """Return robosuite's names of the grippers that a robot can hold, its usual one first."""
+    usual = OWN_GRIPPERS.get(robot.name, robot.gripper)
+    return (usual, "PandaGripper") if robot.name in WITH_PANDA_GRIPPER else (usual,)
+
+
+def robot_with_gripper(name: object, gripper: object) -> Robot:
+    """Return the robot with a given name and gripper.
+
+    Args:
+        name: robosuite's name of the robot.
+        gripper: robosuite's name of the gripper.
+
+    Raises:
+        UnknownName: no such robot is supported, or it holds no such gripper.
+    """
+    robot = robot_named(name)
+    known = grippers_of(robot)
+    if not isinstance(gripper, str) or gripper not in known:
+        raise UnknownName(f"gripper of {robot.name}", gripper, known)
+    return robot if gripper == known[0] else WITH_PANDA_GRIPPER[robot.name]
 
 
 def places_of(table: Mapping[str, Places | str], robot: Robot, task: str) -> Places:

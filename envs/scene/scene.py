@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import logging
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -45,6 +46,7 @@ class CompiledScene:
         labels: (ngeom,) names of the geoms, for messages.
         fixtures: solids that never move; a one-armed robot's own base and the floor are excluded, a two-armed robot's
             trunk is included.
+        recipe: function and arguments that it was compiled by, for pickles.
     """
 
     robot: Robot
@@ -61,6 +63,7 @@ class CompiledScene:
     owner: np.ndarray
     labels: tuple[str, ...]
     fixtures: tuple[Obstacle, ...]
+    recipe: tuple[Callable[..., CompiledScene], tuple[Any, ...]]
 
     def __copy__(self) -> CompiledScene:
         return self
@@ -70,7 +73,7 @@ class CompiledScene:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it was compiled from."""
-        return compiled_scene, (self.robot, self.spec, tuple(index.side for index in self.arms))
+        return self.recipe
 
 
 def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...] | None = None) -> CompiledScene:
@@ -89,21 +92,48 @@ def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...
 
 @lru_cache(maxsize=16)
 def _compiled(robot: Robot, spec: SceneSpec, working: tuple[str, ...]) -> CompiledScene:
-    library = _model_library()
+    with robosuite_library():
+        from . import robosuite_model as library
     with decimal_points():
         env = library.table_env(robot.name, robot.gripper, spec, robot.place(working))
+    model = env.sim.model._model
+    objects = [_body_of(model, each.name) for each in spec.objects]
+    furniture = [model.body(each.name).id for each in spec.furniture]
+    known = {**{body: FIRST_OBJECT + k for k, body in enumerate(objects)}, **dict.fromkeys(furniture, FURNITURE)}
+    recipe = compiled_scene, (robot, spec, working)
+    return scene_of(env, robot, spec, working, np.array(objects, dtype=np.int64), known, recipe)
+
+
+def scene_of(
+    env: Any,
+    robot: Robot,
+    spec: SceneSpec,
+    working: tuple[str, ...],
+    objects: np.ndarray,
+    known: dict[int, int],
+    recipe: tuple[Callable[..., CompiledScene], tuple[Any, ...]],
+) -> CompiledScene:
+    """Return the scene of a robosuite environment, with the addresses of its parts.
+
+    Args:
+        env: robosuite's environment; its model is copied.
+        robot: its robot.
+        spec: scene contents that the environment was given: obstacles, beads and furniture by name.
+        working: names of the working arms.
+        objects: (n,) body ids of the free objects.
+        known: owners by body id, of the bodies of objects, furniture and whatever else does not belong to the world.
+        recipe: function and arguments that give this scene again.
+    """
     model, rob = copy.copy(env.sim.model._model), env.robots[0]
     indices = {side: arm_index(model, rob, side, robot.speeds, robot.name) for side in rob.arms}
     idle = tuple(side for side in rob.arms if side not in working)
-    objects = np.array([_body_of(model, each.name) for each in spec.objects], dtype=np.int64)
     furniture = np.array([model.body(each.name).id for each in spec.furniture], dtype=np.int64)
     bodies = [model.body(f"obstacle{k}").id for k in range(spec.obstacles)]
     obstacles = np.array([(body, *_geoms(model, body)) for body in bodies], dtype=np.int64).reshape(-1, 3)
     beads = [model.body(f"bead{k}").id for k in range(spec.beads.count)] if spec.beads else []
     joints = model.body_jntadr[np.array(beads, dtype=np.int64)]
     places = model.jnt_qposadr[joints[:, None] + np.arange(3)].astype(np.int64)
-    known = {**{int(body): FIRST_OBJECT + k for k, body in enumerate(objects)}, **dict.fromkeys(beads, BEAD)}
-    known |= {**{int(body): FURNITURE for body in furniture}, **dict.fromkeys(bodies, OBSTACLE)}
+    known = {**known, **dict.fromkeys(beads, BEAD), **dict.fromkeys(bodies, OBSTACLE)}
     owner, labels = _owners(model, [indices[side] for side in (*working, *idle)], known)
     dof = len(robot.speeds)
     return CompiledScene(
@@ -121,6 +151,7 @@ def _compiled(robot: Robot, spec: SceneSpec, working: tuple[str, ...]) -> Compil
         owner=owner,
         labels=labels,
         fixtures=static_shapes(model, np.flatnonzero(owner == WORLD)),
+        recipe=recipe,
     )
 
 
@@ -134,18 +165,18 @@ def robot_arm(robot: Robot, index: int = 0) -> Arm:
     return compiled_scene(robot).arms[index].arm
 
 
-def _model_library() -> Any:
-    """Return the module that builds models, imported late: robosuite takes seconds and warns of optional packages.
+@contextmanager
+def robosuite_library() -> Iterator[None]:
+    """Let modules that use robosuite be imported in the `with` block, late: it takes seconds.
 
-    It also imports libraries that draw, and sets MUJOCO_GL for this and all further processes.
+    robosuite warns of optional packages, imports libraries that draw, and sets MUJOCO_GL for this and all further
+    processes.
     """
     before, backend = logging.root.manager.disable, os.environ.get("MUJOCO_GL")
     logging.disable(logging.WARNING)
     try:
         with deferred("PIL", "PIL.Image", "cv2", "mujoco.viewer"):
-            from . import robosuite_model
-
-        return robosuite_model
+            yield
     finally:
         logging.disable(before)
         if backend is None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...planner import Box, Capsule, Cylinder, Pose, Shape, Sphere
+from ...planner import Box, Capsule, Cylinder, Mesh, Pose, Shape, Sphere
 
 TABLE_HEIGHT = 0.8
 """Height (z) of the table top [m]."""
@@ -181,6 +181,8 @@ def half_sizes(shape: Shape) -> tuple[str, tuple[float, float, float]]:
 
 def extents(shape: Shape) -> np.ndarray:
     """Return the full extents (3,) [m] along the shape's own axes."""
+    if isinstance(shape, Mesh):
+        return np.ptp(shape.vertices, axis=0)
     kind, half = half_sizes(shape)
     if kind == "box":
         return 2.0 * np.array(half)

@@ -29,7 +29,7 @@ class Start(NamedTuple):
     Attributes:
         joints: (n_arms, dof) joint positions [rad].
         objects: (n_objects, 7) world poses, x y z [m] and wxyz.
-        furniture: (n_furniture, 7) world poses, likewise.
+        furniture: (n_furniture, 7) world poses, likewise; furniture that is part of the model stands where it does.
         beads: (n_beads, 3) world positions [m].
         scheduled_obstacles: obstacles of the episode.
         grips: (n_arms,) gap of the finger pads [m] of a gripper that is closing on an object; nan for an open gripper.
@@ -52,6 +52,13 @@ class Simulation:
 
     def __init__(self, robot: Robot, things: SceneSpec, sides: tuple[str, ...] | None = None):
         self._build(compiled_scene(robot, things, sides))
+
+    @classmethod
+    def of(cls, scene: CompiledScene) -> Simulation:
+        """Return the simulation of a scene, however it was compiled."""
+        made = cls.__new__(cls)
+        made._build(scene)
+        return made
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -103,7 +110,7 @@ class Simulation:
             self._put(arm, q, 0.0)
         for address, pose in zip(self._object_places, start.objects, strict=True):
             self.data.qpos[address : address + 7] = pose
-        if len(start.furniture):
+        if len(self.scene.furniture):
             self.data.mocap_pos[self.scene.furniture] = start.furniture[:, :3]
             self.data.mocap_quat[self.scene.furniture] = start.furniture[:, 3:]
         if len(start.beads):
@@ -167,6 +174,11 @@ class Simulation:
         """Return (n_arms, n_objects) whether the fingers of each arm touched an object in the last state read."""
         fingers = FINGERS + 2 * np.arange(len(self._servos))
         return self._touching[fingers, FIRST_OBJECT:] != 0.0
+
+    @property
+    def object_places(self) -> np.ndarray:
+        """(n_objects,) addresses of the objects' poses in `qpos`."""
+        return self._object_places
 
     def widest_opening(self, index: int) -> float:
         """Return the gap between the finger pads of an arm's open gripper [m]."""

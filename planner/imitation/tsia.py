@@ -158,6 +158,22 @@ def departure(demonstrated: PosePath, start: Pose, length: float) -> PosePath:
     return part.moved(start @ demonstrated[0].inverse())
 
 
+def ending(demonstrated: PosePath, length: float) -> PosePath:
+    """Return the end of a path.
+
+    Args:
+        demonstrated: the path.
+        length: path length [m] of the end; infinite for all of it.
+
+    Raises:
+        BadOption: the length is negative or not a number.
+    """
+    check_range("length", length, "[0, inf]")
+    lengths = demonstrated.lengths()
+    first = int(np.searchsorted(lengths, lengths[-1] - length)) if length < lengths[-1] else 0
+    return demonstrated if first == 0 else demonstrated[min(first, len(demonstrated) - 2) :]
+
+
 def two_sided_path(demonstrated: PosePath, start: Pose, goal: Pose) -> PosePath:
     """Imitate with both ends anchored: the demonstrated beginning from the start, the demonstrated end to the goal.
 

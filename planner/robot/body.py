@@ -12,7 +12,7 @@ from ..arrays import FrozenArrays, checked_array, checked_items, checked_kind, f
 from ..errors import BadModel, BadOption, BadShape, UnknownName, WrongType
 from ..geometry.capsule_cover import covering_capsules
 from ..geometry.pose import Pose
-from ..geometry.shapes import MAX_VERTICES, Shape
+from ..geometry.shapes import MAX_VERTICES, Obstacle, Shape
 from .arm import Arm
 from .kinematics import CHAIN
 
@@ -136,12 +136,12 @@ class Body(FrozenArrays):
         """Number of capsules."""
         return len(self.rows)
 
-    def holding(self, name: str, shape: Shape, tcp_from_object: Pose, arm: Arm) -> Body:
+    def holding(self, name: str, shape: Shape | Sequence[Obstacle], tcp_from_object: Pose, arm: Arm) -> Body:
         """Return the body with an object in the hand, covered by capsules.
 
         Args:
             name: of the object, not yet in use.
-            shape: of the object.
+            shape: of the object; or the convex solids that it consists of, with their poses in the object's frame.
             tcp_from_object: pose of the object in the hand.
             arm: the arm this body belongs to.
 
@@ -150,16 +150,17 @@ class Body(FrozenArrays):
             UnknownName: the name is in use.
         """
         checked_kind("name", name, str)
-        if not isinstance(shape, Shape):
-            raise WrongType("shape", shape, "a Sphere, Capsule, Box, Cylinder or Mesh")
+        solids = [Obstacle(shape)] if isinstance(shape, Shape) else _checked_solids(shape)
         checked_kind("tcp_from_object", tcp_from_object, Pose)
         checked_kind("arm", arm, Arm)
         if name in self.names:
             raise UnknownName("free name for a held object", name, ["any that is not in use"])
         last_from_object = last_from_tcp(arm) @ tcp_from_object
         rows = [
-            np.concatenate([[arm.dof - 1.0], *(_moved(last_from_object, end) for end in capsule[:2]), [capsule[2]]])
-            for capsule in covering_capsules(shape)
+            np.concatenate([[arm.dof - 1.0], *(_moved(last_from_solid, end) for end in capsule[:2]), [capsule[2]]])
+            for solid in solids
+            for last_from_solid in [last_from_object @ solid.pose]
+            for capsule in covering_capsules(solid.shape)
         ]
         hulls = (*self.hulls, *[None] * len(rows)) if self.hulls else ()
         names = (*self.names, *[name] * len(rows))
@@ -180,6 +181,29 @@ class Body(FrozenArrays):
     def moving(self) -> Body:
         """Return the body without its fixed base."""
         return self._part(np.flatnonzero(self.rows[:, BODY.frame] >= 0), self.held)
+
+    def with_base_moved(self, by: np.ndarray) -> Body:
+        """Return the body of a robot that stands elsewhere: its fixed base is displaced.
+
+        Args:
+            by: (3,) displacement of the base [m].
+
+        Raises:
+            BadShape: it is no such vector.
+        """
+        by = checked_array("by", by, (3,))
+        fixed, moved = self.rows[:, BODY.frame] < 0, {}
+        rows = self.rows.copy()
+        for column in (BODY.a, BODY.b):
+            rows[fixed, column : column + 3] += by
+        for k in np.flatnonzero(fixed) if self.hulls else ():
+            hull = self.hulls[k]
+            if hull is not None and id(hull) not in moved:  # capsules that share a hull go on sharing it
+                moved[id(hull)] = hull.moved(Pose.from_position_quaternion(by))
+        hulls = tuple(
+            moved.get(id(hull), hull) if base else hull for hull, base in zip(self.hulls, fixed, strict=False)
+        )
+        return replace(self, rows=rows, hulls=hulls)
 
     def _part(self, keep: Sequence[int] | np.ndarray, held: tuple[str, ...]) -> Body:
         names = tuple(self.names[k] for k in keep)
@@ -226,6 +250,17 @@ class Body(FrozenArrays):
             if hull is not None and id(hull) not in moved:
                 moved[id(hull)] = hull.moved(tcp_from_last)
         return tuple(None if hull is None else moved[id(hull)] for hull in mine)
+
+
+def _checked_solids(solids: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
+    """Return the solids of a held object.
+
+    Raises:
+        WrongType: what is given is neither a shape nor a sequence of solids.
+    """
+    if not isinstance(solids, Sequence) or not solids or not all(isinstance(each, Obstacle) for each in solids):
+        raise WrongType("shape", solids, "a Sphere, Capsule, Box, Cylinder or Mesh, or a sequence of obstacles")
+    return tuple(solids)
 
 
 def last_from_tcp(arm: Arm) -> Pose:

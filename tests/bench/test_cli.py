@@ -89,7 +89,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
     "arguments, message",
     [
         (["demo", "check", "missing.npz"], "missing.npz: file: does not exist"),
-        (["demo", "check", "nothing"], "unknown demonstration 'nothing'; known: pour, shelve, stack"),
+        (["demo", "check", "nothing"], "unknown demonstration 'nothing'; known: lift, nut_assembly, pour"),
         (["demo", "record", "juggle", "-o", "x.npz"], "unknown scripted demonstration 'juggle'; known: pour, shelve"),
         (["demo", "import", "x.npy", "-o", "x.npz", "--task", "stack"], "x.npy: file: does not exist"),
         (["demo", "import", "none.csv", "-o", "x.npz", "--rate", "10"], "none.csv: file: does not exist"),
@@ -106,7 +106,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["run", "stack", "level=L9"], "level: unknown level 'L9'; known: L0: the demonstration's own layout; L1: "),
         (["run", "stack", "robot=R2D2"], "robot: unknown robot 'R2D2'; known: Panda"),
         (["run", "stack", "method=magic"], "method: unknown method 'magic'; known: screw"),
-        (["run", "stack", "demonstration=x"], "unknown demonstration 'x'; known: pour, shelve, stack"),
+        (["run", "stack", "demonstration=x"], "unknown demonstration 'x'; known: lift, nut_assembly, pour"),
         (["run", "stack", "demonstration=x.npz"], "x.npz: file: does not exist"),
         (
             ["run", "stack", "settings.motion.guid=1", "episodes=1"],
@@ -146,7 +146,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["demo", "import", "x.csv"], "Missing option '--output' / '-o'; usage: onedemo demo import"),
         (["demo", "import", "x.csv", "-o", "y.npz", "--rate", "soon"], "Invalid value for '--rate'"),
         (["demo", "import", "x.csv", "-o", "no/x.npz"], "--output: no/x.npz cannot be written: there is no folder no"),
-        (["demo", "import", "x.csv", "-o", "."], "--output: . is a folder, not a file"),
+        (["demo", "import", "x.csv", "-o", "."], "--output: . does not end in .npz"),
         (["run", "stack", "-o", "a_file", "episodes=1"], "command line: --output: no run folder at a_file/stack-"),
     ],
 )
@@ -196,7 +196,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
     def missing(*_):
         raise ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
 
-    monkeypatch.setattr("onedemo.envs.simulation.simulation.compiled_scene", missing)
+    monkeypatch.setattr("onedemo.envs.core.environment.compiled_scene", missing)
     monkeypatch.chdir(tmp_path)
     code, out, err = called(monkeypatch, capsys, "run", "stack", "episodes=1", "executor=serial")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
@@ -206,7 +206,7 @@ def test_a_missing_library_of_opencv_is_one_line_that_says_what_to_install(monke
     def broken(*_):
         raise ImportError("cannot import name 'x'")
 
-    monkeypatch.setattr("onedemo.envs.simulation.simulation.compiled_scene", broken)
+    monkeypatch.setattr("onedemo.envs.core.environment.compiled_scene", broken)
     monkeypatch.setattr(sys, "argv", ["onedemo", "run", "stack", "episodes=1", "executor=serial"])
     with pytest.raises(ImportError, match="cannot import name"):
         main()

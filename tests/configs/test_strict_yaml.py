@@ -113,5 +113,5 @@ def test_shipped_files_are_found_by_name():
     assert shipped_demonstration("stack").is_file()
     with pytest.raises(UnknownName, match="unknown config 'stak'; known: bimanual_pour, compare, headline"):
         shipped_config("stak")
-    with pytest.raises(UnknownName, match="unknown demonstration 'x'; known: pour, shelve, stack"):
+    with pytest.raises(UnknownName, match="unknown demonstration 'x'; known: lift, nut_assembly, pour, shelve, stack"):
         shipped_demonstration("x")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import mujoco
@@ -10,7 +11,7 @@ import pytest
 from helpers.arms import table_panda
 
 from onedemo.envs.scene.robot_bodies import fitted_bodies, robot_body
-from onedemo.envs.scene.robots import ROBOTS
+from onedemo.envs.scene.robots import ROBOTS, WITH_PANDA_GRIPPER, robot_with_gripper
 from onedemo.envs.scene.scene import compiled_scene
 from onedemo.planner.errors import UnknownName
 from onedemo.planner.geometry.shapes import Box, Cylinder
@@ -27,9 +28,15 @@ def test_the_shipped_table_is_what_is_fitted(robot):
         np.testing.assert_allclose(shipped.rows[:, 7], body.rows[:, 7], atol=1e-3)
 
 
-@pytest.mark.parametrize("robot", sorted(ROBOTS))
+def with_each_gripper():
+    """Every robot, and those that can hold a Panda's gripper once more with it."""
+    return {**ROBOTS, **{f"{name} with a Panda's gripper": each for name, each in WITH_PANDA_GRIPPER.items()}}
+
+
+@pytest.mark.parametrize("robot", sorted(with_each_gripper()))
 def test_the_shipped_capsules_hold_every_corner_of_the_links(robot):
-    scene, body = compiled_scene(ROBOTS[robot]), robot_body(ROBOTS[robot])
+    kind = with_each_gripper()[robot]
+    scene, body = compiled_scene(kind), robot_body(kind)
     model, index = scene.model, scene.arms[0]
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     for _ in range(20):
@@ -40,6 +47,15 @@ def test_the_shipped_capsules_hold_every_corner_of_the_links(robot):
             corners = link_corners(model, data, int(model.joint(name).bodyid[0]))
             if len(corners):
                 assert outside(body, index.arm, q, joint, corners) <= 1e-5, name
+
+
+def test_a_robot_with_another_gripper_is_the_same_after_a_pickle_and_has_capsules_of_its_own():
+    own, other = (robot_with_gripper("Sawyer", gripper) for gripper in ("RethinkGripper", "PandaGripper"))
+    assert own is ROBOTS["Sawyer"] is not other and pickle.loads(pickle.dumps(other)) is other
+    assert robot_with_gripper("Panda", "PandaGripper") is ROBOTS["Panda"]
+    assert not np.array_equal(robot_body(own).rows, robot_body(other).rows)
+    with pytest.raises(UnknownName, match="unknown gripper of Sawyer 'x'; known: RethinkGripper, PandaGripper"):
+        robot_with_gripper("Sawyer", "x")
 
 
 def test_the_planners_tests_use_the_panda_that_is_shipped():

@@ -1,0 +1,85 @@
+"""The skill of a demonstration in the words of a task: its names, its shapes, only what it has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ...envs import TaskDescription
+from ...planner import Demonstration, Obstacle
+from ...planner.errors import BadDemonstration, UnknownName
+from ...planner.skills.infer import infer_skill
+from ...planner.skills.names import matched_names
+from ...planner.skills.skill import Phase, Skill
+from ...planner.skills.thing import Thing
+
+
+def skill_of(
+    demonstration: Demonstration, task: TaskDescription | None = None, names: Mapping[str, str] | None = None
+) -> Skill:
+    """Return what a demonstration shows.
+
+    Args:
+        demonstration: with a gripper command, and the paths of objects or of joints of the scene.
+        task: a task to do it in, `env.unwrapped.task`: its shapes make references and symmetries sharper, and the
+            skill has its names; what it does not have is left out, with a note. None: names as demonstrated, no shapes.
+        names: the task's names of things that have others in the demonstration.
+
+    Raises:
+        BadDemonstration: no skill is found in it, or none whose things the task has.
+        UnknownName: a phase refers to a thing that the task does not have.
+    """
+    if task is None:
+        return infer_skill(demonstration)
+    known = things_of(task)
+    found = _counterparts(demonstration, known, names or {})
+    skill = infer_skill(demonstration, {shown: known[name] for shown, name in found.items()})
+    return _in_task(skill, found, known)
+
+
+def things_of(task: TaskDescription) -> dict[str, Thing]:
+    """Return the shapes of a task's objects, furniture and fixtures by name."""
+    things = {each.name: Thing(each.name, each.parts) for each in task.objects}
+    things |= {each.name: Thing(each.name, each.parts, free=False) for each in task.furniture if each.parts}
+    for each in task.fixtures:
+        things.setdefault(each.name, Thing(each.name, (Obstacle(each.shape),), free=False))
+    return things
+
+
+def _counterparts(demonstration: Demonstration, known: Mapping[str, Thing], given: Mapping[str, str]) -> dict[str, str]:
+    """Return the task's names of the things in a demonstration that it has."""
+    shown = [*demonstration.object_paths, *demonstration.fixtures]
+    for name in given:
+        if name not in shown:
+            raise UnknownName("thing of the demonstration", name, shown)
+    found: dict[str, str] = {}
+    for name in shown:
+        options = {name: given[name]} if name in given else {}
+        try:
+            found |= matched_names([name], known, options)
+        except UnknownName:
+            if name in given:
+                raise
+    return found
+
+
+def _in_task(skill: Skill, found: Mapping[str, str], known: Mapping[str, Thing]) -> Skill:
+    """Return a skill with a task's names, without the phases whose thing the task does not have."""
+    absent = {phase.thing for phase in skill.phases if phase.thing and phase.thing not in found}
+    phases = tuple(_renamed(phase, found, known) for phase in skill.phases if phase.thing not in absent)
+    if not any(phase.thing for phase in phases):
+        reason = f"shows {', '.join(sorted(absent))}, none of which the task has; it has {', '.join(known)}: give names"
+        raise BadDemonstration(skill.name, "object_paths", reason)
+    notes = tuple(f"{name} is not in the task: what was shown with it is left out" for name in sorted(absent))
+    return replace(skill, phases=phases, notes=(*skill.notes, *notes))
+
+
+def _renamed(phase: Phase, found: Mapping[str, str], known: Mapping[str, Thing]) -> Phase:
+    if phase.reference and phase.reference not in found:
+        raise UnknownName(f"thing of the task, to which {phase.name!r} refers,", phase.reference, known)
+    return replace(
+        phase,
+        thing=found.get(phase.thing, ""),
+        reference=found.get(phase.reference, ""),
+        touching=tuple(found[name] for name in phase.touching if name in found),
+    )

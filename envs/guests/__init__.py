@@ -1,0 +1,1 @@
+"""robosuite's own tasks: its models, placement and judge, the project's servos and obstacles."""

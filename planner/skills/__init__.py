@@ -1,0 +1,1 @@
+"""Skills: what a demonstration shows, as data; inferred by rules that name no task."""

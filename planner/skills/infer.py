@@ -1,0 +1,253 @@
+"""A skill from ONE demonstration, by rules that name no task.
+
+Not in the paper, where a person cuts the demonstration and says what each motion refers to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import BadDemonstration
+from ..geometry.pose import Pose, PosePath
+from ..imitation.demonstration import Demonstration
+from ..imitation.segmentation import trimmed
+from .alike import hand_turns, own_turns, reference_turns
+from .articulations import Articulation, articulations
+from .grips import BRIEF, Closing, Grip, grips
+from .references import Reference, reference_of
+from .skill import START, Choice, Phase, Skill
+from .thing import Thing
+
+TRIM = 0.02
+"""Radius [m] about the end of a motion within which what people do before they let go or grasp is left out."""
+RISE = 0.005
+"""Height [m] above its rest at which an object is let go: pressed on its support, a tilted one is thrown aside."""
+DROP = 0.02
+"""Height [m] of a fall from which the released pose is the goal, not the rest."""
+WITHDRAWAL = 0.03
+"""Path length [m] after the last release from which the hand's motion is a withdrawal of its own."""
+
+
+class Scene(NamedTuple):
+    """Knowledge besides the demonstration.
+
+    Attributes:
+        things: shapes by name, as the demonstration names them; may be empty.
+    """
+
+    things: Mapping[str, Thing]
+
+    def thing(self, name: str) -> Thing | None:
+        """Return the shape of a thing; None if it is unknown."""
+        return self.things.get(name)
+
+
+def infer_skill(demonstration: Demonstration, things: Mapping[str, Thing] | None = None) -> Skill:
+    """Infer what a demonstration shows.
+
+    Args:
+        demonstration: with a gripper command and the paths of objects.
+        things: shapes of objects and fixtures by the names of the demonstration; they make references and symmetries
+            sharper.
+
+    Raises:
+        BadDemonstration: no skill is found in it; the error says what is missing.
+    """
+    scene = Scene(things or {})
+    _check(demonstration)
+    held, empty = grips(demonstration)
+    hinged = articulations(demonstration, held)
+    if not held and not hinged:
+        raise BadDemonstration(demonstration.name, "object_paths", _nothing_moves(demonstration, empty))
+    phases: list[Phase] = []
+    choices: list[Choice] = []
+    notes: list[str] = []
+    begin, last = 0, None
+    for event in sorted([*held, *hinged], key=lambda event: event.held):
+        number = len(phases) // 2 + 1
+        if isinstance(event, Grip):
+            new, open_choices = _fetch_and_carry(demonstration, scene, event, begin, number)
+            choices += open_choices
+        else:
+            new = _turn_on_its_hinge(demonstration, event, begin, number)
+        phases += new
+        begin, last = event.released, event
+    notes += [_left_out(demonstration, closing) for closing in empty if not _belongs(closing, hinged)]
+    withdrawal = _withdrawal(demonstration, begin, last)
+    return Skill(demonstration.name, demonstration.robot, (*phases, *withdrawal), tuple(choices), tuple(notes))
+
+
+def _check(demonstration: Demonstration) -> None:
+    if not demonstration.object_paths and not demonstration.other_joints:
+        reason = "none is recorded: a skill is found from what moves; record the poses of the objects, or name segments"
+        raise BadDemonstration(demonstration.name, "object_paths", reason)
+    if demonstration.gripper is None:
+        reason = "is not recorded: without it nobody knows when the hand held something"
+        raise BadDemonstration(demonstration.name, "gripper", reason)
+
+
+def _nothing_moves(demonstration: Demonstration, empty: Sequence[Closing]) -> str:
+    moved = {
+        name: float(np.linalg.norm(path.positions - path.positions[0], axis=1).max())
+        for name, path in demonstration.object_paths.items()
+    }
+    most = max(moved, key=lambda name: moved[name]) if moved else ""
+    closed = f"the hand closes {len(empty)} times" if empty else "the hand never closes"
+    return f"none was carried: {closed}" + (f", {most} moves {1e3 * moved[most]:.0f} mm at most" if most else "")
+
+
+def _left_out(demonstration: Demonstration, closing: Closing) -> str:
+    since = demonstration.time[closing.start] - demonstration.time[0]
+    seconds = demonstration.time[closing.stop] - demonstration.time[closing.start]
+    brief = ", opened again at once" if seconds < BRIEF and closing.opens else ""
+    return f"the hand closes on nothing at {since:.1f} s{brief}: left out"
+
+
+def _belongs(closing: Closing, hinged: Sequence[Articulation]) -> bool:
+    return any(closing.start <= each.released and each.held <= closing.stop for each in hinged)
+
+
+def _fetch_and_carry(
+    demonstration: Demonstration, scene: Scene, grip: Grip, begin: int, number: int
+) -> tuple[list[Phase], list[Choice]]:
+    """Return the phases of reaching an object and carrying it away."""
+    thing = scene.thing(grip.name)
+    shown = trimmed(demonstration.path[begin : max(grip.closed, begin + 1) + 1], TRIM)
+    ends = grip.undisturbed @ grip.object_from_tcp
+    reach = Phase(
+        name=f"reach {grip.name}" if number == 1 else f"reach {grip.name} ({number})",
+        kind="reach",
+        thing=grip.name,
+        reference=grip.name,
+        path=PosePath(np.concatenate([shown.dqs[:-1], _same_sign(shown.dqs[-1], ends)[None]])),
+        goals=(grip.object_from_tcp,),
+        left=own_turns(thing, grip.undisturbed),
+        right=hand_turns(),
+        object_from_tcp=grip.object_from_tcp,
+        gripper="close",
+        touching=(grip.name,),
+        evidence=(f"{grip.name} moves with the hand from {_at(demonstration, grip.held)} on",),
+    )
+    carry, choices = _carry(demonstration, scene, grip, number)
+    return [reach, carry], choices
+
+
+def _same_sign(dq: np.ndarray, pose: Pose) -> np.ndarray:
+    return pose.dq if dq[:4] @ pose.dq[:4] >= 0.0 else -pose.dq
+
+
+def _carry(demonstration: Demonstration, scene: Scene, grip: Grip, number: int) -> tuple[Phase, list[Choice]]:
+    path = demonstration.object_paths[grip.name][grip.held : grip.released + 1]
+    released = path[-1]
+    rest = grip.rested or released
+    places = {
+        **{name: other[grip.released] for name, other in demonstration.object_paths.items() if name != grip.name},
+        **demonstration.fixtures,
+    }
+    name = f"carry {grip.name}" if number == 1 else f"carry {grip.name} ({number})"
+    reference = reference_of(grip.name, rest, places, scene.things)
+    if not grip.opens or not reference.name:
+        why = "is in the hand to the end" if not grip.opens else reference.why
+        ends = (grip.undisturbed.inverse() @ released,)
+        return _carried(name, grip, START, path, ends, (f"{grip.name} {why}",)), []
+    at = places[reference.name]
+    fall = float(released.position[2] - rest.position[2])
+    lifted = Pose.from_position_quaternion([0.0, 0.0, RISE]) @ rest
+    shown = released if fall > RISE else Pose.from_position_quaternion([0.0, 0.0, RISE - fall]) @ released
+    order = (shown, lifted) if fall > DROP else (lifted, shown)
+    goals = tuple(at.inverse() @ pose for pose in order)
+    phase = _carried(name, grip, reference.name, trimmed(path, TRIM), goals, (reference.why,))
+    left = reference_turns(scene.thing(reference.name), at, goals[0], scene.thing(grip.name))
+    phase = _with(phase, left, own_turns(scene.thing(grip.name), rest), reference)
+    return phase, _open_choice(phase, reference)
+
+
+def _carried(
+    name: str, grip: Grip, reference: str, path: PosePath, goals: tuple[Pose, ...], evidence: tuple[str, ...]
+) -> Phase:
+    return Phase(
+        name=name,
+        kind="carry",
+        thing=grip.name,
+        reference=reference,
+        path=path,
+        goals=goals,
+        object_from_tcp=grip.object_from_tcp,
+        gripper="open" if grip.opens else "none",
+        evidence=evidence,
+    )
+
+
+def _with(phase: Phase, left: tuple[Pose, ...], right: tuple[Pose, ...], reference: Reference) -> Phase:
+    from dataclasses import replace
+
+    return replace(phase, left=left, right=right, touching=reference.touched)
+
+
+def _open_choice(phase: Phase, reference: Reference) -> list[Choice]:
+    if not reference.others:
+        return []
+    return [Choice(phase.name, "reference", reference.name, reference.others, reference.why)]
+
+
+def _turn_on_its_hinge(demonstration: Demonstration, event: Articulation, begin: int, number: int) -> list[Phase]:
+    """Return the phases of reaching a hinged thing and moving it; where it pushes, what was commanded is followed."""
+    commanded = demonstration.commanded if demonstration.commanded is not None else demonstration.path
+    suffix = "" if number == 1 else f" ({number})"
+    name = event.reference or "the world"
+    first, at = demonstration.path[event.held], event.place
+    reach = Phase(
+        name=f"reach {name}{suffix}",
+        kind="reach",
+        thing=event.reference,
+        reference=event.reference,
+        path=demonstration.path[min(begin, event.held - 1) : event.held + 1],
+        goals=(at.inverse() @ first,),
+        gripper="close" if event.closed else "none",
+        touching=(event.reference,) if event.reference else (),
+        evidence=(f"{', '.join(event.joints)} moves from {_at(demonstration, event.held)} on",),
+    )
+    path = commanded[event.held : event.released + 1]
+    turn = Phase(
+        name=f"move {name}{suffix}",
+        kind="articulate",
+        thing=event.reference,
+        reference=event.reference,
+        path=PosePath(np.concatenate([_same_sign(path.dqs[0], first)[None], path.dqs[1:]])),
+        goals=(at.inverse() @ path[-1],),
+        gripper="open" if event.closed else "none",
+        touching=(event.reference,) if event.reference else (),
+        exact=True,
+        evidence=(
+            "where it pushes, the commanded path is followed"
+            if demonstration.commanded is not None
+            else "the measured path is followed: what was commanded is not recorded",
+        ),
+    )
+    return [reach, turn]
+
+
+def _withdrawal(demonstration: Demonstration, begin: int, last: Grip | Articulation | None) -> list[Phase]:
+    """Return the hand's motion after the last release, if it was shown."""
+    rest = demonstration.path[begin:]
+    if last is None or (isinstance(last, Grip) and not last.opens) or rest.lengths()[-1] < WITHDRAWAL:
+        return []
+    path = PosePath(rest.dqs)
+    return [
+        Phase(
+            name="withdraw",
+            kind="withdraw",
+            thing="",
+            reference=START,
+            path=path,
+            goals=(path[0].inverse() @ path[-1],),
+            evidence=(f"the hand moves on from {_at(demonstration, begin)}",),
+        )
+    ]
+
+
+def _at(demonstration: Demonstration, sample: int) -> str:
+    return f"{demonstration.time[sample] - demonstration.time[0]:.1f} s"
