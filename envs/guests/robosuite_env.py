@@ -91,7 +91,8 @@ class RobosuiteEnv(TaskEnv[GuestProgress]):
     By `level`: L0, L1, L2, R, S and T start alike. L3 has one to three static obstacles of 3 to 10 cm on the hand's
     path, L4 one that swings across the path at up to 0.3 m/s or appears during it, F a static one where the forearm
     passes. They block the way from above an object to above its place, or from the start to what the hand moves,
-    and leave clearance at the start and at both ends, for any method.
+    and leave clearance at the start and at both ends, for any method. Where that way is short, as in
+    Stack at D0, none fits, and the reset is refused by `NoRoom`.
 
     ## Episode End
     `terminated` with a settled success, or when an object has fallen off the table. `truncated` after 60 s
