@@ -13,7 +13,7 @@ SLOW, FAST = 2.0, 20_000.0
 
 
 def seconds_of(stamps: np.ndarray, unit: str, blame: Blame) -> tuple[np.ndarray, str]:
-    """Return times (n,) [s] from the first sample on, and a line that says what the stamps are.
+    """Return times (n,) [s], as recorded or, of stamps since 1970, from the first on, and a line that says what they are.
 
     Args:
         stamps: (n,) as recorded, finite.
@@ -34,5 +34,6 @@ def seconds_of(stamps: np.ndarray, unit: str, blame: Blame) -> tuple[np.ndarray,
         likely = [each for each, length in SECONDS.items() if SLOW <= 1.0 / (step * length) <= FAST]
         words = " or ".join(f"{each} ({1.0 / (step * SECONDS[each]):.4g} Hz)" for each in likely) or "s, ms, us or ns"
         raise blame(f"has steps of {step:.6g}, which are no seconds: {words}? say so with --time-unit")
-    since = ", since 1970" if epoch and epoch == found else ""
-    return (stamps - stamps[0]) * SECONDS[found], f"time stamps are in {found}{since}: {rate:.4g} Hz"
+    is_dated = epoch == found
+    origin, since = (stamps[0], ", since 1970") if is_dated else (0.0, "")
+    return (stamps - origin) * SECONDS[found], f"time stamps are in {found}{since}: {rate:.4g} Hz"
