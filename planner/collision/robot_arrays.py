@@ -235,9 +235,11 @@ def with_hulls(robot: np.ndarray, hulls: Sequence[Hull | None]) -> np.ndarray:
             continue
         if id(hull) not in known:
             known[id(hull)] = len(rows)
-            for first in range(0, len(hull.corners), PER_ROW):
-                numbers = np.asarray(hull.corners)[first : first + PER_ROW].ravel()
-                rows.append(np.pad(numbers, (0, WIDTH - len(numbers))))
+            block = np.zeros((-(-len(hull.corners) // PER_ROW), WIDTH))
+            numbers = np.zeros((len(block), 3 * PER_ROW))
+            numbers.reshape(-1)[: hull.corners.size] = np.ravel(hull.corners)
+            block[:, : 3 * PER_ROW] = numbers
+            rows.extend(block)
         capsule[CAPSULE.first_corner], capsule[CAPSULE.corners] = known[id(hull)], len(hull.corners)
         capsule[CAPSULE.rounding] = hull.rounding
     robot[ROW.header, HEADER.first_corner], robot[ROW.header, HEADER.corner_rows] = end, len(rows)

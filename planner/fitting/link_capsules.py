@@ -100,6 +100,7 @@ class _Covering:
     def __init__(self, source: str, split: Split):
         self._source, self._split = source, split
         self._known: dict[tuple[int, bool], tuple[Piece, Cover]] = {}
+        self._rough: dict[int, tuple[Piece, Cover]] = {}
         self._hulls: dict[int, tuple[Piece, Hull | None]] = {}
 
     def check(self, pieces: list[Piece]) -> None:
@@ -127,9 +128,11 @@ class _Covering:
         return self._laid(pieces, [self._rough_cover(piece) for piece in pieces], hulls=True)
 
     def _rough_cover(self, piece: Piece) -> Cover:
-        hull = self._hull(piece)
-        found, more = ([], 0.0) if hull is None else (rough_capsule(hull.corners), hull.rounding)
-        return piece.geometry.exact + [(a, b, radius + more) for a, b, radius in found]
+        if id(piece) not in self._rough:
+            hull = self._hull(piece)
+            found, more = ([], 0.0) if hull is None else (rough_capsule(hull.corners), hull.rounding)
+            self._rough[id(piece)] = piece, piece.geometry.exact + [(a, b, radius + more) for a, b, radius in found]
+        return self._rough[id(piece)][1]
 
     def _laid(self, pieces: list[Piece], covers: list[Cover], *, hulls: bool) -> Body:
         rows, labels, laid = [], [], []

@@ -12,8 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadModel, UnfitShape
+from ..geometry.convex_pieces import rounded_hull, thinned
+from ..geometry.hulls import directions
 from ..geometry.pose import Pose
 from ..geometry.shapes import hull_corners
+from ..geometry.triangle_surface import nearest_on_triangles
 from ..robot.body import Body
 from ..robot.joint_frames import moved
 from .finger_sweeps import swept, through
@@ -21,6 +24,10 @@ from .robot_model import Geometry, RobotModel, joined, placed, places_of
 
 SWEPT = ", swept"
 """End of the label of what is swept."""
+ROUGH, SOME = 0.002, 2000
+"""Rounding [m] of a hull, and number of points on a surface, about, by which the deepest point is found."""
+DECIMALS = 12
+"""Number of decimals of a pose in a link's frame, well above rounding."""
 FLAT = "the points of its geometry cannot be covered"
 
 
@@ -112,10 +119,18 @@ def _elements(robot: RobotModel, world: list[Pose], frames: list[Pose]):
         to_frame = (world[k] if frame < 0 else frames[frame + 1]).inverse()
         if part.joints:
             points = through(robot, part, swept(robot, k))
-            geometries = [Geometry([], moved(to_frame @ world[part.parent], points))]
+            geometries = [Geometry([], moved(_settled(to_frame @ world[part.parent]), points))]
         else:
-            geometries = [placed(to_frame @ world[k], geometry) for geometry in part.geometry]
+            geometries = [placed(_settled(to_frame @ world[k]), geometry) for geometry in part.geometry]
         yield place.piece, frame, k, bool(part.joints), geometries
+
+
+def _settled(pose: Pose) -> Pose:
+    """Return a pose without the rounding of the way to it through the world, which depends on the arm's base.
+
+    Where a capsule's optimum is flat, the last digits of its points decide about some 0.1 mm.
+    """
+    return Pose(np.round(pose.dq, DECIMALS) + 0.0)
 
 
 def owners_of(body: Body, pieces: Sequence[Piece]) -> list[Piece]:
@@ -150,13 +165,13 @@ def _merged(solids: list[Geometry], bulge: float) -> list[Geometry]:
     left = dict(enumerate(solids))
     if len(left) < 2:
         return solids
-    volumes = {k: _volume(solid.points) for k, solid in left.items()}
+    volumes = {k: volume(solid.points) for k, solid in left.items()}
     common: dict[tuple[int, int], float] = {}  # volumes of the hulls of pairs, each found once
     while True:
         best, least = None, bulge
         for i, j in combinations(left, 2):
             if (i, j) not in common:
-                common[i, j] = _volume(np.vstack([left[i].points, left[j].points]))
+                common[i, j] = volume(np.vstack([left[i].points, left[j].points]))
             ratio = common[i, j] / max(volumes[i] + volumes[j], 1e-12)
             if ratio <= least:
                 best, least = (i, j), ratio
@@ -195,10 +210,63 @@ def hull_points(points: np.ndarray) -> np.ndarray:
         return points
 
 
-def _volume(points: np.ndarray) -> float:
+def volume(points: np.ndarray) -> float:
+    """Return the volume [m^3] of the hull of points (n, 3) [m]; 0 of flat ones."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         return float(ConvexHull(points).volume)
     except (QhullError, ValueError):
         return 0.0
+
+
+class PieceSurfaces:
+    """Planes, points and thinned surfaces of pieces, each found once."""
+
+    def __init__(self) -> None:
+        self._planes: dict[int, tuple[Piece, np.ndarray]] = {}
+        self._points: dict[int, tuple[Piece, np.ndarray]] = {}
+        self._thin: dict[int, tuple[Piece, np.ndarray]] = {}
+
+    def deepest(self, piece: Piece, points: np.ndarray) -> np.ndarray | None:
+        """Return the point (3,) that lies deepest in a piece's hull; None if none does.
+
+        Args:
+            piece: the piece.
+            points: (n, 3) in its frame [m].
+        """
+        from scipy.spatial import ConvexHull
+
+        if not len(piece.geometry.triangles):
+            return None
+        if id(piece) not in self._planes:
+            self._planes[id(piece)] = piece, ConvexHull(rounded_hull(piece.geometry.points, ROUGH)[0]).equations
+        planes = self._planes[id(piece)][1]
+        depth = -(points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        return points[int(depth.argmax())] if depth.max() > 0.0 else None
+
+    def gap(self, piece: Piece, point: np.ndarray | None) -> float:
+        """Return about the distance [m] of a point on a piece's hull from its surface; 0 without triangles.
+
+        Args:
+            piece: the piece.
+            point: (3,) in its frame [m]; None: there is none, at a distance of 0.
+        """
+        if not len(piece.geometry.triangles) or point is None:
+            return 0.0
+        if id(piece) not in self._thin:
+            self._thin[id(piece)] = piece, thinned(piece.geometry.triangles)
+        return float(np.linalg.norm(point - nearest_on_triangles(point, self._thin[id(piece)][1])))
+
+    def points(self, piece: Piece) -> np.ndarray:
+        """Return points (n, 3) on a piece's surface: of the corners and the middles of its triangles, or all around."""
+        if id(piece) not in self._points:
+            around = [
+                end + radius * directions() for a, b, radius in piece.geometry.exact for end in (a, 0.5 * (a + b), b)
+            ]
+            if len(piece.geometry.points):
+                triangles = surface(piece.geometry)
+                around += [np.unique(triangles.reshape(-1, 3), axis=0), triangles.mean(axis=1)]
+            points = np.vstack(around)
+            self._points[id(piece)] = piece, points[:: max(1, len(points) // SOME)]
+        return self._points[id(piece)][1]

@@ -8,49 +8,45 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
 from ..collision.capsule_placement import place_capsules
 from ..collision.hull_distance import CLOSE, pair_hull_distance
 from ..collision.robot_arrays import ROW, robot_arrays
-from ..geometry.convex_pieces import best_cut, rounded_hull, thinned
-from ..geometry.hulls import directions
+from ..geometry.convex_pieces import best_parts
 from ..geometry.shapes import pack
-from ..geometry.triangle_surface import nearest_on_triangles
 from ..jit import kernel
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..robot.kinematics import FRAME, forward_into
-from .link_pieces import Piece, owners_of, surface
+from .link_pieces import Piece, PieceSurfaces, owners_of
+from .merged_pieces import TOO_CLOSE, Looks, Merger, Names, errors_of, worst_of
 from .mesh_distances import MeshDistances, rotation_of
 from .self_contacts import distances_of_pairs, rest_on_each_other, survey_of
 
-TOO_CLOSE = 0.002
-"""Distance [m] by which hulls may be closer than the surfaces."""
-LOOKS, ROUNDS = 300, 16
-"""Postures per pair of parts in which the truth is measured at first; rounds of cuts."""
-AROUND, COPIES, STRAY = 8, 5, 0.02
+SURVEYED, LOOKS, ROUNDS = 16000, 350, 24
+"""Random postures among which close ones are looked for; postures per pair of parts in which the truth is measured at
+first; rounds of cuts."""
+AROUND, COPIES, STRAY = 8, 4, 0.02
 """Postures with the largest errors about which more are looked at in a round; number of
 postures about each; how far these lie from it, as a share of the joints' ranges."""
-WORST, FEW = 0.7, 12
+NEARLY = 0.6
+"""Share of the error that is too large up to which postures, and parts, need no further look."""
+DRAWN = 8
+"""Postures that are drawn for each that is looked at: those in which hulls are not close show nothing."""
+WORST, FEW = 0.5, 12
 """Share of the largest error from which a piece is cut in a round; number of points, about, that choose a plane."""
-ROUGH, SOME = 0.002, 2000
-"""Rounding [m] of a hull, and number of points on a surface, about, by which the deepest point is found."""
+DONE = 0.0025
+"""Error [m] at which cutting ends where there is no room for further pieces."""
+ENOUGH, WORSE, SPARE = 0.0023, 0.0027, 4
+"""Error [m] up to which pieces may be merged to make room for cuts against larger ones; and up to which they may if
+that makes no room for so many cuts."""
 MOST_CUT = 56
 """Pieces beyond which nothing is cut any more: every query visits all of them."""
 
-Names = tuple[str, str]
 Blame = dict[int, list[tuple[float, np.ndarray]]]
 """By a piece's identity, how much [m] its hull makes other parts seem too close, and the point (3,) on or in it."""
-
-
-class _Looks(NamedTuple):
-    """Postures (n, dof) in which two parts seem close, and their true distances (n,) [m]."""
-
-    postures: np.ndarray
-    true: np.ndarray
 
 
 def refined(
@@ -68,52 +64,106 @@ def refined(
         most: largest number of pieces.
     """
     most, hopeless, rng = min(most, MOST_CUT), dict[int, Piece](), np.random.default_rng(2)
-    body = cover(pieces)
-    looks, solids = _first_looks(arm, body, pieces, truth, rng), _Solids()
+    body, merger, solids = cover(pieces), Merger(arm, cover), PieceSurfaces()
+    looks, unseen = _first_looks(arm, body, pieces, truth, rng)
+    least, best = math.inf, pieces
     for _ in range(ROUNDS):
-        blame = _blamed(arm, body, pieces, truth, looks, rng, solids)
-        blame = {key: found for key, found in blame.items() if key not in hopeless}
-        if not blame or len(pieces) >= most:
+        blame = _blamed(arm, body, pieces, truth, looks, rng, solids, hopeless)
+        largest = max((error for found in blame.values() for error, _ in found), default=0.0)
+        if unseen and largest <= DONE:  # good so far: are others good too?
+            _look_at(unseen, looks, robot_arrays((arm,), (body,), pack(())), owners_of(body, pieces), truth)
+            unseen, least = {}, math.inf
+            continue
+        if largest <= least:
+            least, best = largest, pieces
+        if not blame:
             break
-        pieces = _cut(pieces, blame, hopeless, most)
+        pieces, is_full = _cut(pieces, blame, hopeless, most)
+        if is_full:
+            count, pieces = len(pieces), _with_room(pieces, merger, looks, largest)
+            if len(pieces) == count:
+                break
         body = cover(pieces)
-    return pieces
+    return best
 
 
-def _cut(pieces: list[Piece], blame: Blame, hopeless: dict[int, Piece], most: int) -> list[Piece]:
-    """Return the pieces with the worst of them cut; those for which no cut is of use are noted as hopeless."""
+def _with_room(pieces: list[Piece], merger: Merger, looks: dict[Names, Looks], largest: float) -> list[Piece]:
+    """Return pieces merged so that there is room for cuts against the largest error, if that is possible and needed."""
+    fewer = merger.merged(pieces, looks, ENOUGH) if largest > DONE else pieces
+    needed = largest > WORSE and len(pieces) - len(fewer) < SPARE
+    return merger.merged(fewer, looks, WORSE) if needed else fewer
+
+
+def _cut(pieces: list[Piece], blame: Blame, hopeless: dict[int, Piece], most: int) -> tuple[list[Piece], bool]:
+    """Return the pieces with the worst of them cut, and whether there was no room for all cuts.
+
+    Pieces for which no cut is of use are noted as hopeless.
+    """
     errors = {key: max(error for error, _ in found) for key, found in blame.items()}
-    limit, cuts = WORST * max(errors.values()), {}
+    limit, cuts, added, is_full = WORST * max(errors.values()), {}, 0, False
     by_key = {id(piece): piece for piece in pieces}
     for key in sorted(errors, key=lambda key: -errors[key]):
-        if errors[key] < limit or len(pieces) + len(cuts) >= most:
+        is_full = is_full or len(pieces) + added >= most
+        if errors[key] < limit or is_full:
             break
         found = sorted(blame[key], key=lambda each: -each[0])
         worst = np.array([point for error, point in found if error >= 0.5 * errors[key]])
         triangles = by_key[key].geometry.triangles
         # where no plane frees the points on average, as all around a hollow, one may free the worst
-        sides = best_cut(triangles, worst[:: max(1, len(worst) // FEW)]) or best_cut(triangles, worst[:1])
-        if sides:
+        some = worst[:: max(1, len(worst) // FEW)]
+        sides = best_parts(triangles, some) or best_parts(triangles, worst[:1])
+        if not sides:
+            hopeless[key] = by_key[key]
+        elif len(pieces) + added + len(sides) - 1 <= most:
+            added += len(sides) - 1
             cuts[key] = [by_key[key].with_triangles(side) for side in sides]
         else:
-            hopeless[key] = by_key[key]
-    return [part for piece in pieces for part in cuts.get(id(piece), [piece])]
+            is_full = True
+    return [part for piece in pieces for part in cuts.get(id(piece), [piece])], is_full
 
 
 def _first_looks(
     arm: Arm, body: Body, pieces: Sequence[Piece], truth: MeshDistances, rng: np.random.Generator
-) -> dict[Names, _Looks]:
-    """Return postures in which two parts seem close, for every pair that is not always so: random, and about these."""
-    survey, looks = survey_of(arm, body), {}
+) -> tuple[dict[Names, Looks], dict[Names, np.ndarray]]:
+    """Return postures in which two parts seem close, for every pair that is not always so; and others, not looked at.
+
+    They are random; where there are few, more are drawn about them.
+    """
+    survey, looks, unseen = survey_of(arm, body, SURVEYED), {}, {}
+    work = robot_arrays((arm,), (body,), pack(()))
     for names, indices in survey.by_parts([piece.label for piece in owners_of(body, pieces)]).items():
         near = survey.distances[:, indices].min(axis=1)
         close = np.flatnonzero(near < CLOSE)
         if len(close) and not rest_on_each_other(survey, indices, truth, names):
-            postures = survey.postures[_evenly(close, LOOKS)]
+            chosen = _evenly(close, LOOKS)
+            postures, unseen[names] = survey.postures[chosen], survey.postures[np.setdiff1d(close, chosen)]
             if len(postures) < LOOKS:
-                postures = np.vstack([postures, _about(arm, postures, LOOKS - len(postures), rng)])
-            looks[names] = _Looks(postures, np.array([truth.between(names, q) for q in postures]))
-    return looks
+                drawn = _about(arm, postures, DRAWN * (LOOKS - len(postures)), rng)
+                close = _closest(work, drawn, survey.pairs[indices], LOOKS - len(postures))
+                postures = np.vstack([postures, drawn[close]])
+            looks[names] = _looks(work, names, survey.pairs[indices], postures, truth)
+    return looks, unseen
+
+
+def _looks(work: np.ndarray, names: Names, pairs: np.ndarray, postures: np.ndarray, truth: MeshDistances) -> Looks:
+    """Return looks at two parts, of which the capsules are given, in postures (n, dof)."""
+    true = np.array([truth.between(names, q) for q in postures])
+    return Looks.of(postures, true, distances_of_pairs(work, postures, pairs).min(axis=1))
+
+
+def _look_at(
+    unseen: dict[Names, np.ndarray],
+    looks: dict[Names, Looks],
+    work: np.ndarray,
+    owners: Sequence[Piece],
+    truth: MeshDistances,
+) -> None:
+    """Add looks at those of some postures of two parts in which their hulls are close."""
+    for names, pairs in _pairs_by_parts([piece.label for piece in owners]).items():
+        postures = unseen.get(names)
+        if postures is not None and len(postures):
+            chosen = postures[_closest(work, postures, pairs, LOOKS)]
+            looks[names] = looks[names].and_more(_looks(work, names, pairs, chosen, truth))
 
 
 def _about(arm: Arm, postures: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -122,37 +172,71 @@ def _about(arm: Arm, postures: np.ndarray, count: int, rng: np.random.Generator)
     return np.clip(np.resize(postures, (count, arm.dof)) + strays, arm.lower, arm.upper)
 
 
+def _closest(work: np.ndarray, postures: np.ndarray, pairs: np.ndarray, most: int) -> np.ndarray:
+    """Return the indices of some postures in which the hulls of two parts are close: in others nothing can be wrong.
+
+    Args:
+        work: array of the arm and its body.
+        postures: (m, dof) to choose from [rad or m].
+        pairs: (n, 2) capsules of the two parts.
+        most: number of postures.
+    """
+    near = distances_of_pairs(work, postures, pairs).min(axis=1)
+    order = np.argsort(near, kind="stable")
+    return _evenly(order[near[order] < CLOSE - TOO_CLOSE], most)
+
+
 def _blamed(
     arm: Arm,
     body: Body,
     pieces: Sequence[Piece],
     truth: MeshDistances,
-    looks: dict[Names, _Looks],
+    looks: dict[Names, Looks],
     rng: np.random.Generator,
-    solids: _Solids,
+    solids: PieceSurfaces,
+    hopeless: dict[int, Piece],
 ) -> Blame:
     """Return which pieces make parts seem closer than they are, and where; more looks are taken about the worst."""
     work, owners, blame = robot_arrays((arm,), (body,), pack(())), owners_of(body, pieces), {}
     for names, pairs in _pairs_by_parts([piece.label for piece in owners]).items():
         if names not in looks:
             continue
-        for more in (True, False):
-            postures, true = looks[names]
-            distances = distances_of_pairs(work, postures, pairs)
-            near = np.maximum(distances.min(axis=1), 0.0)
-            errors = np.where(true > 0.0, np.minimum(true, CLOSE) - near, -np.inf)
-            if more and errors.max() > 0.5 * TOO_CLOSE:
-                new = _about(arm, postures[np.argsort(-errors)[:AROUND]], AROUND * COPIES, rng)
-                found = np.array([truth.between(names, q) for q in new])
-                looks[names] = _Looks(np.vstack([postures, new]), np.concatenate([true, found]))
-        worst = np.argsort(-errors)[:FEW]
+        look = _more(arm, work, names, pairs, looks[names], truth, rng)
+        seen = look.postures[look.is_open]
+        distances = distances_of_pairs(work, seen, pairs)
+        errors = errors_of(distances, look.true[look.is_open])
+        look.is_open[look.is_open] = errors > NEARLY * TOO_CLOSE
+        looks[names], worst = look, worst_of(errors, distances, FEW)
         for k in worst[errors[worst] > TOO_CLOSE]:
             i, j = pairs[int(distances[k].argmin())]
-            both, pair, touching = (owners[i], owners[j]), (int(i), int(j)), bool(near[k] <= 0.0)
-            point = _point_to_blame(arm, work, both, pair, postures[k], solids, touching=touching)
+            both, pair, touching = (owners[i], owners[j]), (int(i), int(j)), bool(distances[k].min() <= 0.0)
+            point = _point_to_blame(arm, work, both, pair, seen[k], solids, hopeless, touching=touching)
             if point is not None:
                 blame.setdefault(point[0], []).append((float(errors[k]), point[1]))
     return blame
+
+
+def _more(
+    arm: Arm,
+    work: np.ndarray,
+    names: Names,
+    pairs: np.ndarray,
+    look: Looks,
+    truth: MeshDistances,
+    rng: np.random.Generator,
+) -> Looks:
+    """Return looks at two parts, and more about those where hulls are, or were, most in error."""
+    some = look.postures[look.is_open]
+    distances = distances_of_pairs(work, some, pairs)
+    errors = errors_of(distances, look.true[look.is_open])
+    hollow = np.flatnonzero(look.in_hollow)
+    around = [some[worst_of(errors, distances, AROUND)]] if errors.max(initial=0.0) > NEARLY * TOO_CLOSE else []
+    around += [look.postures[rng.choice(hollow, AROUND)]] if len(hollow) else []
+    for postures in around:
+        drawn = _about(arm, postures, DRAWN * COPIES * len(postures), rng)
+        new = drawn[_closest(work, drawn, pairs, COPIES * len(postures))]
+        look = look.and_more(_looks(work, names, pairs, new, truth))
+    return look
 
 
 def _pairs_by_parts(labels: Sequence[str]) -> dict[Names, np.ndarray]:
@@ -169,7 +253,8 @@ def _point_to_blame(
     both: tuple[Piece, Piece],
     pair: tuple[int, int],
     q: np.ndarray,
-    solids: _Solids,
+    solids: PieceSurfaces,
+    hopeless: dict[int, Piece],
     *,
     touching: bool,
 ) -> tuple[int, np.ndarray] | None:
@@ -182,6 +267,7 @@ def _point_to_blame(
         pair: capsules of the two.
         q: (dof,) joints.
         solids: what is known of pieces.
+        hopeless: pieces of which no cut is of use, by identity: the other one is to blame.
         touching: the hulls touch, so that they have no closest points.
     """
     frames = _frames_of(both, arm, q)
@@ -193,7 +279,9 @@ def _point_to_blame(
         world = list(closest)
     local = [(points - place) @ turn for points, (turn, place) in zip(world, frames, strict=True)]
     found = [solids.deepest(*each) for each in zip(both, local, strict=True)] if touching else local
-    gaps = [solids.gap(piece, point) for piece, point in zip(both, found, strict=True)]
+    gaps = [
+        0.0 if id(piece) in hopeless else solids.gap(piece, point) for piece, point in zip(both, found, strict=True)
+    ]
     side = int(np.argmax(gaps))
     point = found[side]
     return (id(both[side]), point) if gaps[side] > 0.0 and point is not None else None
@@ -220,48 +308,6 @@ def _frames_of(pieces: Sequence[Piece], arm: Arm, q: np.ndarray) -> list[tuple[n
             rotation, position = turn @ rotation, turn @ position + row[FRAME.origin : FRAME.rotation]
         found.append((rotation, position))
     return found
-
-
-class _Solids:
-    """Planes, points and thinned surfaces of pieces, each found once."""
-
-    def __init__(self) -> None:
-        self._planes: dict[int, tuple[Piece, np.ndarray]] = {}
-        self._points: dict[int, tuple[Piece, np.ndarray]] = {}
-        self._thin: dict[int, tuple[Piece, np.ndarray]] = {}
-
-    def deepest(self, piece: Piece, points: np.ndarray) -> np.ndarray | None:
-        """Return the point (3,) of some (n, 3) that lies deepest in a piece's hull; None if none does."""
-        from scipy.spatial import ConvexHull
-
-        if not len(piece.geometry.triangles):
-            return None
-        if id(piece) not in self._planes:
-            self._planes[id(piece)] = piece, ConvexHull(rounded_hull(piece.geometry.points, ROUGH)[0]).equations
-        planes = self._planes[id(piece)][1]
-        depth = -(points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-        return points[int(depth.argmax())] if depth.max() > 0.0 else None
-
-    def gap(self, piece: Piece, point: np.ndarray | None) -> float:
-        """Return about the distance [m] of a point on a piece's hull from its surface; 0 without triangles."""
-        if not len(piece.geometry.triangles) or point is None:
-            return 0.0
-        if id(piece) not in self._thin:
-            self._thin[id(piece)] = piece, thinned(piece.geometry.triangles)
-        return float(np.linalg.norm(point - nearest_on_triangles(point, self._thin[id(piece)][1])))
-
-    def points(self, piece: Piece) -> np.ndarray:
-        """Return points (n, 3) on a piece's surface: of the corners and the middles of its triangles, or all around."""
-        if id(piece) not in self._points:
-            around = [
-                end + radius * directions() for a, b, radius in piece.geometry.exact for end in (a, 0.5 * (a + b), b)
-            ]
-            if len(piece.geometry.points):
-                triangles = surface(piece.geometry)
-                around += [np.unique(triangles.reshape(-1, 3), axis=0), triangles.mean(axis=1)]
-            points = np.vstack(around)
-            self._points[id(piece)] = piece, points[:: max(1, len(points) // SOME)]
-        return self._points[id(piece)][1]
 
 
 def _evenly(indices: np.ndarray, most: int) -> np.ndarray:

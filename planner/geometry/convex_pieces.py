@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from ..jit import inner, kernel
 from .convex_distance import PER_ROW, convex_distance
 from .hulls import box_axes
 from .shapes import MAX_VERTICES, SHAPE_KIND, hull_corners
-from .triangle_surface import nearest_on_triangles
+from .triangle_surface import cut_off, nearest_on_triangles
 
 FRACTIONS = np.linspace(0.05, 0.95, 16)
 """Positions of the planes that are tried, as fractions of the solid's extent."""
@@ -28,6 +30,10 @@ MANY = 1200
 """Number of triangles from which on a surface is thinned to choose a plane."""
 DEEPEST, TURNS = 3, 6
 """Number of deepest points that planes are laid through, and of such planes per point."""
+DEEP = 0.004
+"""Distance [m] of a point from the surface from which on it may lie in a hollow that takes sectors to open."""
+FANS, SHIFTS, HOLLOWS = (3, 4), 2, 2
+"""Numbers of sectors that are tried around a hollow, number of their turns, and of deepest points."""
 FLAT = 1e-4
 """Share of the largest extent below which the smallest one is none."""
 
@@ -55,12 +61,98 @@ def best_cut(triangles: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
     if best is None:
         return []
     sides = _both_sides(triangles, best)
+    return sides if _are_solids(sides) and (len(thin) == len(triangles) or _gain(sides, points) > 0.0) else []
+
+
+def _are_solids(parts: list[np.ndarray]) -> bool:
+    """Return whether all parts enclose a volume: slivers do not."""
     try:
-        for side in sides:
-            hull_corners(side.reshape(-1, 3))
-    except UnfitShape:  # a sliver
+        for part in parts:
+            hull_corners(part.reshape(-1, 3))
+    except UnfitShape:
+        return False
+    return True
+
+
+def best_parts(triangles: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
+    """Cut a solid by a plane, or into sectors around a hollow: by what frees points more for every further part.
+
+    The plane that seems best at first may cut through a hollow, so that every part of it has to be opened by itself.
+
+    Args:
+        triangles: (n, 3, 3) of its surface, without regard to their order [m].
+        points: (k, 3) on or in its hull, off its surface [m].
+
+    Returns:
+        The triangles of the parts; empty if no cut is worth further pieces.
+    """
+    found = [parts for parts in (best_cut(triangles, points), fan_cut(triangles, points)) if parts]
+    return max(found, key=lambda parts: _gain(parts, points) / (len(parts) - 1), default=[])
+
+
+def fan_cut(triangles: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
+    """Cut a solid into sectors around a hollow that no single plane opens, as that of a ring or below a roof.
+
+    One plane through a ring leaves two halves whose hulls still fill it; sectors about a line in the hollow do not.
+    What lies beyond the hollow's roof is cut off first: sectors of it would be of no use.
+
+    Args:
+        triangles: (n, 3, 3) of its surface, without regard to their order [m].
+        points: (k, 3) on or in its hull, off its surface [m].
+
+    Returns:
+        The triangles of the parts; empty if no sectors are worth further pieces.
+    """
+    if not len(triangles):
         return []
-    return sides if len(thin) == len(triangles) or _gain(sides, points) > 0.0 else []
+    thin, best, most = thinned(triangles), None, 0.0
+    for fan in _fans(thin, points):
+        parts = _sectors(thin, fan)
+        gain = _gain(parts, points) - WORTH * (len(parts) - 1)
+        if gain > most:
+            most, best = gain, fan
+    if best is None:
+        return []
+    parts = _sectors(triangles, best)
+    return parts if _are_solids(parts) and (len(thin) == len(triangles) or _gain(parts, points) > 0.0) else []
+
+
+class _Fan(NamedTuple):
+    """Planes about a line.
+
+    Attributes:
+        roof: normal (3,) and height [m] of a plane, beyond which nothing is cut further; None: there is none.
+        normals: (k, 3) of the planes through the line; a sector lies between one and the next.
+        point: (3,) on the line [m].
+    """
+
+    roof: tuple[np.ndarray, float] | None
+    normals: np.ndarray
+    point: np.ndarray
+
+
+def _fans(triangles: np.ndarray, points: np.ndarray) -> Iterator[_Fan]:
+    """Yield fans about the deepest points and their middle: below the nearest surface as a roof, or beside it."""
+    middle = points.mean(axis=0, keepdims=True)
+    centers = (*_deepest(triangles, middle, DEEP), *islice(_deepest(triangles, points, DEEP), HOLLOWS))
+    for point, foot, out in centers:
+        sides = np.linalg.svd(out[None])[2][1:]
+        for axis, roof in ((out, (out, float(out @ foot))), (sides[0], None), (sides[1], None)):
+            one, other = np.linalg.svd(axis[None])[2][1:]
+            for count in FANS:
+                for shift in np.arange(SHIFTS) / SHIFTS:
+                    angles = 2.0 * np.pi / count * (np.arange(count) + shift)
+                    yield _Fan(roof, np.outer(np.cos(angles), one) + np.outer(np.sin(angles), other), point)
+
+
+def _sectors(triangles: np.ndarray, fan: _Fan) -> list[np.ndarray]:
+    """Return the parts of triangles beyond a fan's roof and in its sectors, as far as there are any."""
+    beyond, rest = (triangles[:0], triangles) if fan.roof is None else _both_sides(triangles, fan.roof)[::-1]
+    heights, parts = fan.normals @ fan.point, [beyond]
+    for k in range(len(heights)):
+        side = cut_off(rest, -fan.normals[k], -heights[k])
+        parts.append(cut_off(side, fan.normals[(k + 1) % len(heights)], heights[(k + 1) % len(heights)]))
+    return [part for part in parts if len(part)]
 
 
 def _both_sides(triangles: np.ndarray, plane: tuple[np.ndarray, float]) -> list[np.ndarray]:
@@ -78,9 +170,9 @@ def thinned(triangles: np.ndarray) -> np.ndarray:
     return np.concatenate([triangles[is_long], others[:: -(-len(others) // (MANY // 2))]])
 
 
-def _gain(sides: list[np.ndarray], points: np.ndarray) -> float:
-    """Mean distance [m] by which the hulls of two sides recede from points (k, 3) in their common hull."""
-    return float(np.minimum(*(_beyond(side, points) for side in sides)).mean())
+def _gain(parts: list[np.ndarray], points: np.ndarray) -> float:
+    """Mean distance [m] by which the hulls of parts recede from points (k, 3) in their common hull."""
+    return float(np.minimum.reduce([_beyond(part, points) for part in parts]).mean())
 
 
 def _across(triangles: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
@@ -94,14 +186,22 @@ def _across(triangles: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
 
 def _along(triangles: np.ndarray, points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
     """Yield normals (3,) and heights [m] of planes through the deepest points and the nearest points of the surface."""
+    for _, foot, out in _deepest(triangles, points, WORTH):
+        across = np.linalg.svd(out[None])[2][1:]
+        for angle in np.pi * np.arange(TURNS) / TURNS:
+            normal = math.cos(angle) * across[0] + math.sin(angle) * across[1]
+            yield normal, float(normal @ foot)
+
+
+def _deepest(
+    triangles: np.ndarray, points: np.ndarray, least: float
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield the points (3,) farthest from a surface, its points nearest to them, and the directions to these."""
     near = [nearest_on_triangles(point, triangles) for point in points]
     gaps = np.array([np.linalg.norm(point - foot) for point, foot in zip(points, near, strict=True)])
     for k in np.argsort(-gaps, kind="stable")[:DEEPEST]:
-        if gaps[k] > WORTH:
-            across = np.linalg.svd(((points[k] - near[k]) / gaps[k])[None])[2][1:]
-            for angle in np.pi * np.arange(TURNS) / TURNS:
-                normal = math.cos(angle) * across[0] + math.sin(angle) * across[1]
-                yield normal, float(normal @ near[k])
+        if gaps[k] > least:
+            yield points[k], near[k], (near[k] - points[k]) / gaps[k]
 
 
 def _beyond(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -111,37 +211,6 @@ def _beyond(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     corners = triangles.reshape(-1, 3)
     extents = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
     return np.full(len(points), -1.0) if extents[2] < FLAT * extents[0] else _to_hull(points, corners)
-
-
-def cut_off(triangles: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
-    """Return the part of triangles that lies below a plane.
-
-    Args:
-        triangles: (n, 3, 3) [m].
-        normal: (3,) unit normal of the plane.
-        height: of the plane along the normal [m].
-
-    Returns:
-        Triangles (k, 3, 3) [m].
-    """
-    heights = triangles @ normal - height
-    below = (heights <= 0.0).sum(axis=1)
-    parts = [triangles[below == 3]]
-    for count in (1, 2):
-        some = below == count
-        # the corner that is alone on its side comes first
-        alone = (heights[some] <= 0.0).argmax(axis=1) if count == 1 else (heights[some] > 0.0).argmax(axis=1)
-        order = (alone[:, None] + np.arange(3)) % 3
-        corners = np.take_along_axis(triangles[some], order[:, :, None], axis=1)
-        high = np.take_along_axis(heights[some], order, axis=1)
-        share = high[:, :1] / (high[:, :1] - high[:, 1:])
-        on_plane = corners[:, :1] + share[:, :, None] * (corners[:, 1:] - corners[:, :1])
-        if count == 1:
-            parts.append(np.concatenate([corners[:, :1], on_plane], axis=1))
-        else:
-            parts.append(np.stack([corners[:, 1], corners[:, 2], on_plane[:, 0]], axis=1))
-            parts.append(np.stack([corners[:, 2], on_plane[:, 0], on_plane[:, 1]], axis=1))
-    return np.concatenate(parts)
 
 
 def rounded_hull(points: np.ndarray, rounding: float) -> tuple[np.ndarray, float]:

@@ -55,6 +55,37 @@ def nearest_on_triangles(point: np.ndarray, triangles: np.ndarray) -> np.ndarray
     return best
 
 
+def cut_off(triangles: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
+    """Return the part of triangles that lies below a plane.
+
+    Args:
+        triangles: (n, 3, 3) [m].
+        normal: (3,) unit normal of the plane.
+        height: of the plane along the normal [m].
+
+    Returns:
+        Triangles (k, 3, 3) [m].
+    """
+    heights = triangles @ normal - height
+    below = (heights <= 0.0).sum(axis=1)
+    parts = [triangles[below == 3]]
+    for count in (1, 2):
+        some = below == count
+        # the corner that is alone on its side comes first
+        alone = (heights[some] <= 0.0).argmax(axis=1) if count == 1 else (heights[some] > 0.0).argmax(axis=1)
+        order = (alone[:, None] + np.arange(3)) % 3
+        corners = np.take_along_axis(triangles[some], order[:, :, None], axis=1)
+        high = np.take_along_axis(heights[some], order, axis=1)
+        share = high[:, :1] / (high[:, :1] - high[:, 1:])
+        on_plane = corners[:, :1] + share[:, :, None] * (corners[:, 1:] - corners[:, :1])
+        if count == 1:
+            parts.append(np.concatenate([corners[:, :1], on_plane], axis=1))
+        else:
+            parts.append(np.stack([corners[:, 1], corners[:, 2], on_plane[:, 0]], axis=1))
+            parts.append(np.stack([corners[:, 2], on_plane[:, 0], on_plane[:, 1]], axis=1))
+    return np.concatenate(parts)
+
+
 def shells_of(triangles: np.ndarray) -> list[np.ndarray]:
     """Return the parts (k, 3, 3) of a surface of triangles (n, 3, 3) that share no corner.
 

@@ -13,7 +13,7 @@ SLOW, FAST = 2.0, 20_000.0
 
 
 def seconds_of(stamps: np.ndarray, unit: str, blame: Blame) -> tuple[np.ndarray, str]:
-    """Return times (n,) [s], as recorded or, of stamps since 1970, from the first on, and a line that says what they are.
+    """Return times (n,) [s], and a line that says what the stamps are; times since 1970 count from the first sample on.
 
     Args:
         stamps: (n,) as recorded, finite.
