@@ -13,6 +13,8 @@ from ..configs import BadConfig
 COMMAND_LINE = "command line"
 NO_LIBRARY = "cannot open shared object file"
 PACKAGES = "apt install libgl1 libglib2.0-0"
+PICTURES = (".png", ".pdf", ".svg")
+"""Allowed suffixes of a picture."""
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,6 +81,17 @@ def check_writable(option: str, path: Path) -> None:
         raise BadConfig(COMMAND_LINE, option, f"{path} cannot be written: there is no folder {folder}")
     if not os.access(path if path.exists() else folder, os.W_OK):
         raise BadConfig(COMMAND_LINE, option, f"{path} cannot be written: no permission")
+
+
+def check_picture(picture: Path) -> None:
+    """Refuse a file of `--picture` that is no picture, or cannot be written.
+
+    Raises:
+        BadConfig: the error names option, path and reason.
+    """
+    if picture.suffix.lower() not in PICTURES:
+        raise BadConfig(COMMAND_LINE, "--picture", f"{picture} does not end in {', '.join(PICTURES)}")
+    check_writable("--picture", picture)
 
 
 @contextmanager

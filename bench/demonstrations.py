@@ -9,8 +9,9 @@ import typer
 
 from ..configs.shipped_files import demonstration_path
 from ..planner.errors import UnknownName
-from .console import check_writable, console, counted, labeled, writing
+from .console import check_picture, check_writable, console, counted, labeled, writing
 
+Texts = list[str] | None
 app = typer.Typer(
     help="Inspect a demonstration, or make one from a recording.", no_args_is_help=True, rich_markup_mode="markdown"
 )
@@ -28,12 +29,12 @@ def check(
 
     Example: onedemo demo check stack
     """
-    from ..planner import read_demonstration
+    from ..configs import load_demonstration
     from ..planner.imitation.demonstration_warnings import warnings_of
     from .recordings.summary import facts, segment_lines, skill_lines
 
     path = demonstration_path(file)
-    demo = read_demonstration(path)
+    demo = load_demonstration(path)
     out = console()
     lines = facts(path, demo)
     out.print(labeled(demo.name, "bold", f"{demo.source} {demo.robot}, task {demo.task or '-'}"))
@@ -53,7 +54,64 @@ def check(
     out.print(labeled("ok", "green", f"with {counted(len(warnings), 'warning')}" if warnings else ""))
 
 
-Texts = list[str] | None
+@app.command()
+def skill(
+    file: Annotated[str, typer.Argument(help="A demonstration (.npz), or the name of a shipped one, like stack.")],
+    change: Annotated[
+        Texts,
+        typer.Option(
+            "--set",
+            help="What it should be: 'PHASE: KEY=VALUE', with the keys reference, goal, turns, grasp, path, gripper, "
+            "skip; or 'NAME=NAME IN THE TASK'; repeatable.",
+        ),
+    ] = None,
+    save: Annotated[bool, typer.Option("--save", help="Keep it, in the file .skill.yaml beside the demonstration.")] = (
+        False
+    ),
+    picture: Annotated[Path | None, typer.Option(help="Draw it (.png, .pdf or .svg).")] = None,
+) -> None:
+    """Print the skill that a demonstration shows, and correct it.
+
+    Phases are what moved relative to what, found in the paths of objects and in the gripper's command. What the
+    demonstration leaves open is said; what is wrong can be set. The page docs/skills.md says how it is found.
+
+    Examples:
+    - onedemo demo skill nut_assembly --picture skill.png
+
+    - onedemo demo skill mine.npz --set 'carry nut: reference=peg' --save
+    """
+    from dataclasses import replace
+
+    from ..configs import load_demonstration
+    from ..configs.skill_file import skill_file, with_said, write_corrections
+    from ..planner.skills.infer import infer_skill
+    from .recordings.summary import lines_of
+
+    path = demonstration_path(file)
+    demo = load_demonstration(path)
+    if change:
+        demo = replace(demo, corrections=with_said(demo.corrections, change))
+    found = infer_skill(demo)
+    if picture is not None:
+        from .recordings.skill_figure import draw_skill
+
+        check_picture(picture)
+        with writing("--picture", picture):
+            draw_skill(demo, found, picture)
+    out = console()
+    for line in lines_of(found):
+        out.print(line)
+    if save:
+        beside = skill_file(path)
+        with writing("--save", beside):
+            write_corrections(demo.corrections, beside)
+        out.print(f"wrote {beside}")
+    elif change:
+        out.print("not kept: --save writes it beside the demonstration")
+    if picture is not None:
+        out.print(f"wrote {picture}")
+
+
 TABLES = "Tables of poses"
 MOTIONS = "Motions and objects"
 

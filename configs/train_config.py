@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, ValidationError
 
 from .errors import BadConfig, unknown_key
-from .learner_defaults import DEFAULTS
+from .learner_arguments import DEFAULTS
 from .run_config import STRICT, Name, digest_of, reason_of
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides
 

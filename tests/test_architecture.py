@@ -22,16 +22,16 @@ ORDER = {
     """,
     "envs": "errors registration mujoco_library scene simulation core stack pour shelve guests",
     "configs": """
-        errors shipped_files demonstrations dotted_keys strict_yaml dataclass_settings run_config
-        learner_defaults grid learner_values train_config plan_scene_schema plan_scene
+        errors shipped_files dotted_keys strict_yaml dataclass_settings skill_file demonstrations run_config
+        learner_arguments grid train_config plan_scene_schema plan_scene
     """,
     "baselines": """
         errors policy extras warm_up key_poses recording motion programs own_policy program_policy
         safe_actions screw_policy learning factory paths_only
     """,
     "bench": """
-        console usage atomic_files statistics provenance interruption task_table method_table recordings
-        demonstrations drawing document robot metrics plan workers episodes report geometric run task_pages
+        console usage atomic_files statistics provenance interruption task_table method_table drawing
+        recordings demonstrations document robot metrics plan workers episodes report geometric run task_pages
         reproduce train curves perf mbm survey cli
     """,
     "face": "former_paths",

@@ -23,16 +23,16 @@ def skill_of(
         demonstration: with a gripper command, and the paths of objects or of joints of the scene.
         task: a task to do it in, `env.unwrapped.task`: its shapes make references and symmetries sharper, and the
             skill has its names; what it does not have is left out, with a note. None: names as demonstrated, no shapes.
-        names: the task's names of things that have others in the demonstration.
+        names: the task's names of things that have others in the demonstration; stronger than its corrections.
 
     Raises:
-        BadDemonstration: no skill is found in it, or none whose things the task has.
-        UnknownName: a phase refers to a thing that the task does not have.
+        BadDemonstration: no skill is found in it, or none whose things the task has; or a correction does not fit.
+        UnknownName: a phase refers to a thing that the task does not have, or a correction to no phase.
     """
     if task is None:
         return infer_skill(demonstration)
     known = things_of(task)
-    found = _counterparts(demonstration, known, names or {})
+    found = _counterparts(demonstration, known, {**demonstration.corrections.names, **(names or {})})
     skill = infer_skill(demonstration, {shown: known[name] for shown, name in found.items()})
     return _in_task(skill, found, known)
 

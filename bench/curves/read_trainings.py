@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from ...configs import BadConfig, TrainConfig
-from ...configs.learner_defaults import DEFAULTS
+from ...configs.learner_arguments import DEFAULTS
 from ...configs.train_config import BESIDE
 from ..method_table import place_of
 from ..train.curve_figure import Curves

@@ -12,6 +12,7 @@ from ...planner.geometry.dualquat import screw_parameters
 from ...planner.imitation.demonstration_files import UNITS
 from ...planner.skills.describe import described
 from ...planner.skills.infer import infer_skill
+from ...planner.skills.skill import Skill
 from .robot_checks import robot_facts
 
 DIRECTIONS = {"up": (0, 0, 1), "down": (0, 0, -1), "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0)}
@@ -134,6 +135,11 @@ def skill_lines(demonstration: Demonstration) -> list[str]:
         skill = infer_skill(demonstration)
     except BadDemonstration as error:
         return [f"skill: none is found: {error.key} {error.reason}"]
+    return lines_of(skill)
+
+
+def lines_of(skill: Skill) -> list[str]:
+    """Return a skill in words, a line for each phase and what is known about it."""
     lines = ["skill, by what moved (in a task the shapes of things make it sharper):"]
     for line, below in described(skill):
         lines += [f"  {line}", *(f"    {text}" for text in below)]

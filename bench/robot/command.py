@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from ..console import COMMAND_LINE, check_writable, console, counted, labeled, writing
+from ..console import COMMAND_LINE, check_picture, console, counted, labeled, writing
 
 if TYPE_CHECKING:
     from .load_robot import LoadedRobot, RobotRequest
 
-PICTURES = (".png", ".pdf", ".svg")
-"""Allowed suffixes of a picture."""
 app = typer.Typer(help="Inspect robots' files.", no_args_is_help=True, rich_markup_mode="markdown")
 
 
@@ -50,7 +48,7 @@ def check(
     from .load_robot import RobotRequest, load_robot
 
     if picture is not None:
-        _check_picture(picture)
+        check_picture(picture)
     request = RobotRequest(
         file,
         tool,
@@ -144,11 +142,3 @@ def _without_speeds(request: RobotRequest) -> bool:
     from .load_robot import kind_of
 
     return kind_of(request.file) == "mujoco"
-
-
-def _check_picture(picture: Path) -> None:
-    from ...configs import BadConfig
-
-    if picture.suffix.lower() not in PICTURES:
-        raise BadConfig(COMMAND_LINE, "--picture", f"{picture} does not end in {', '.join(PICTURES)}")
-    check_writable("--picture", picture)

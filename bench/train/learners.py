@@ -12,8 +12,7 @@ from ...baselines import task_episode
 from ...baselines.extras import needed
 from ...configs import BadConfig, TrainConfig
 from ...configs.errors import unknown_key
-from ...configs.learner_defaults import DEFAULTS
-from ...configs.learner_values import misfit_of
+from ...configs.learner_arguments import DEFAULTS, misfit_of
 from ...envs.core.single_motion import HORIZON
 from ...planner.errors import BadOption
 from .learner_env import base_env, learners_env, shown

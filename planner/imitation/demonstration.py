@@ -12,6 +12,7 @@ from ..arrays import checked_items, checked_kind
 from ..errors import BadDemonstration, UnknownName
 from ..geometry.pose import Pose, PosePath
 from ..ranges import check_count
+from .corrections import Corrections
 
 SOURCES = ("teleoperated", "kinesthetic", "scripted")
 GRIPPER_ACTIONS = ("close", "open", "none")
@@ -80,6 +81,7 @@ class Demonstration:
         fixtures: pose in the world of each thing that stood still.
         other_joints: (n,) positions [rad or m] of joints that are not the arm's: of fingers, doors, drawers.
         commanded: n poses in the world that the tcp was sent to; None if not recorded.
+        corrections: what a person says of its skill; no part of the recording, but in a file of its own.
 
     Raises:
         BadDemonstration: an invalid field; the error names the field and the reason.
@@ -102,6 +104,7 @@ class Demonstration:
     fixtures: Mapping[str, Pose] = field(default_factory=dict)
     other_joints: Mapping[str, np.ndarray] = field(default_factory=dict)
     commanded: PosePath | None = None
+    corrections: Corrections = field(default_factory=Corrections)
 
     def __post_init__(self):
         name = self.robot

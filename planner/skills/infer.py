@@ -16,6 +16,7 @@ from ..imitation.demonstration import Demonstration
 from ..imitation.segmentation import trimmed
 from .alike import hand_turns, own_turns, reference_turns
 from .articulations import Articulation, articulations
+from .corrected import corrected, regrasped, said_path, said_reference
 from .grips import BRIEF, Closing, Grip, grips
 from .references import Reference, reference_of
 from .skill import START, Choice, Phase, Skill
@@ -46,7 +47,7 @@ class Scene(NamedTuple):
 
 
 def infer_skill(demonstration: Demonstration, things: Mapping[str, Thing] | None = None) -> Skill:
-    """Infer what a demonstration shows.
+    """Infer what a demonstration shows, with its corrections.
 
     Args:
         demonstration: with a gripper command and the paths of objects.
@@ -54,7 +55,8 @@ def infer_skill(demonstration: Demonstration, things: Mapping[str, Thing] | None
             sharper.
 
     Raises:
-        BadDemonstration: no skill is found in it; the error says what is missing.
+        BadDemonstration: no skill is found in it, or a correction does not fit; the error says what is missing.
+        UnknownName: a correction is said of no phase.
     """
     scene = Scene(things or {})
     _check(demonstration)
@@ -76,8 +78,9 @@ def infer_skill(demonstration: Demonstration, things: Mapping[str, Thing] | None
         phases += new
         begin, last = event.released, event
     notes += [_left_out(demonstration, closing) for closing in empty if not _belongs(closing, hinged)]
-    withdrawal = _withdrawal(demonstration, begin, last)
-    return Skill(demonstration.name, demonstration.robot, (*phases, *withdrawal), tuple(choices), tuple(notes))
+    phases = corrected([*phases, *_withdrawal(demonstration, begin, last)], demonstration)
+    still_open = tuple(each for each in choices if each.phase in {phase.name for phase in phases})
+    return Skill(demonstration.name, demonstration.robot, tuple(phases), still_open, tuple(notes))
 
 
 def _check(demonstration: Demonstration) -> None:
@@ -115,10 +118,12 @@ def _fetch_and_carry(
 ) -> tuple[list[Phase], list[Choice]]:
     """Return the phases of reaching an object and carrying it away."""
     thing = scene.thing(grip.name)
+    name = f"reach {grip.name}" if number == 1 else f"reach {grip.name} ({number})"
+    grip = regrasped(demonstration, grip, name)
     shown = trimmed(demonstration.path[begin : max(grip.closed, begin + 1) + 1], TRIM)
     ends = grip.undisturbed @ grip.object_from_tcp
     reach = Phase(
-        name=f"reach {grip.name}" if number == 1 else f"reach {grip.name} ({number})",
+        name=name,
         kind="reach",
         thing=grip.name,
         reference=grip.name,
@@ -148,21 +153,34 @@ def _carry(demonstration: Demonstration, scene: Scene, grip: Grip, number: int) 
         **demonstration.fixtures,
     }
     name = f"carry {grip.name}" if number == 1 else f"carry {grip.name} ({number})"
+    said = said_reference(demonstration, name, places)
     reference = reference_of(grip.name, rest, places, scene.things)
-    if not grip.opens or not reference.name:
+    if said is not None:
+        touched = tuple(dict.fromkeys([said, *reference.touched])) if said else ()
+        reference = Reference(said, touched, (), "ends where it is said")
+    if not reference.name or (not grip.opens and said is None):
         why = "is in the hand to the end" if not grip.opens else reference.why
         ends = (grip.undisturbed.inverse() @ released,)
         return _carried(name, grip, START, path, ends, (f"{grip.name} {why}",)), []
     at = places[reference.name]
-    fall = float(released.position[2] - rest.position[2])
-    lifted = Pose.from_position_quaternion([0.0, 0.0, RISE]) @ rest
-    shown = released if fall > RISE else Pose.from_position_quaternion([0.0, 0.0, RISE - fall]) @ released
-    order = (shown, lifted) if fall > DROP else (lifted, shown)
-    goals = tuple(at.inverse() @ pose for pose in order)
+    ends = _ends(released, rest, demonstration.corrections.of(name).goal, lets_go=grip.opens)
+    goals = tuple(at.inverse() @ pose for pose in ends)
     phase = _carried(name, grip, reference.name, trimmed(path, TRIM), goals, (reference.why,))
     left = reference_turns(scene.thing(reference.name), at, goals[0], scene.thing(grip.name))
     phase = _with(phase, left, own_turns(scene.thing(grip.name), rest), reference)
     return phase, _open_choice(phase, reference)
+
+
+def _ends(released: Pose, rest: Pose, goal: str | None, *, lets_go: bool) -> tuple[Pose, ...]:
+    """Return where a carried object may end, the likeliest first."""
+    if not lets_go:
+        return (released,)
+    fall = float(released.position[2] - rest.position[2])
+    lifted = Pose.from_position_quaternion([0.0, 0.0, RISE]) @ rest
+    shown = released if fall > RISE else Pose.from_position_quaternion([0.0, 0.0, RISE - fall]) @ released
+    if goal is not None:
+        return (shown,) if goal == "release" else (lifted,)
+    return (shown, lifted) if fall > DROP else (lifted, shown)
 
 
 def _carried(
@@ -195,9 +213,9 @@ def _open_choice(phase: Phase, reference: Reference) -> list[Choice]:
 
 def _turn_on_its_hinge(demonstration: Demonstration, event: Articulation, begin: int, number: int) -> list[Phase]:
     """Return the phases of reaching a hinged thing and moving it; where it pushes, what was commanded is followed."""
-    commanded = demonstration.commanded if demonstration.commanded is not None else demonstration.path
     suffix = "" if number == 1 else f" ({number})"
     name = event.reference or "the world"
+    commanded, why = said_path(demonstration, f"move {name}{suffix}")
     first, at = demonstration.path[event.held], event.place
     reach = Phase(
         name=f"reach {name}{suffix}",
@@ -221,11 +239,7 @@ def _turn_on_its_hinge(demonstration: Demonstration, event: Articulation, begin:
         gripper="open" if event.closed else "none",
         touching=(event.reference,) if event.reference else (),
         exact=True,
-        evidence=(
-            "where it pushes, the commanded path is followed"
-            if demonstration.commanded is not None
-            else "the measured path is followed: what was commanded is not recorded",
-        ),
+        evidence=(why,),
     )
     return [reach, turn]
 

@@ -24,7 +24,7 @@ from onedemo.bench.train.evaluations import Point
 from onedemo.bench.train.folder import curve_of
 from onedemo.bench.train.progress import EVERY, progress, steps_done, writing_steps
 from onedemo.configs.errors import BadConfig
-from onedemo.configs.learner_defaults import DEFAULTS
+from onedemo.configs.learner_arguments import DEFAULTS
 from onedemo.configs.shipped_files import FOLDER, shipped_training
 from onedemo.configs.train_config import ALGORITHMS, TRAIN_KEYS, load_training
 
