@@ -15,8 +15,6 @@ CLIP_SECONDS = 8.0
 """Duration of a clip; the playback speed follows from it."""
 CLIP_FRAMES = 96
 CLIP_QUALITY = 55
-WITHOUT_PROGRAM = {"robosuite": "onedemo/Robosuite-v0"}
-"""Environments by the name of their page that no shipped program does: they are listed, and have no clip."""
 MOST_PICTURES = 300
 """Largest number of pictures rendered of an episode that takes its whole time limit."""
 
@@ -30,8 +28,6 @@ def list_tasks() -> None:
         table.add_column(head, no_wrap=head == "id")
     for name, facts in TASKS.items():
         table.add_row(facts.id, summary_of(facts.id), f"{IDS[facts.id].seconds:g}", f"onedemo run {name}")
-    for identifier in WITHOUT_PROGRAM.values():
-        table.add_row(identifier, summary_of(identifier), f"{IDS[identifier].seconds:g}", "none")
     console().print(table, soft_wrap=False)
 
 
@@ -50,19 +46,16 @@ def summary_of(identifier: str) -> str:
 
 def page_text(task: str) -> str:
     """Return the Markdown page of a task's environment: its docstring below its clip, if it has one."""
-    identifier = TASKS[task].id if task in TASKS else WITHOUT_PROGRAM[task]
+    identifier = TASKS[task].id
     summary, _, rest = str(inspect.getdoc(environment_class(identifier))).partition("\n\n")
-    parts = [
+    return "\n\n".join([
         f"# {identifier}",
         " ".join(summary.split()),
         f"![The planner at work on {identifier}]({task}.webp)",
         f'```python\nimport gymnasium as gym\nimport onedemo.envs\n\nenv = gym.make("{identifier}")\n```',
         rest,
-        f"One run of the planner on it: `onedemo run {task}`.",
-    ]
-    if task in WITHOUT_PROGRAM:
-        del parts[5], parts[2]
-    return "\n\n".join(parts) + "\n"
+        f"One run of the planner on it: `onedemo run {task}`.\n",
+    ])  # fmt: skip
 
 
 def write_pages(folder: Path, *, clips: bool) -> list[Path]:
@@ -79,19 +72,19 @@ def write_pages(folder: Path, *, clips: bool) -> list[Path]:
         BadConfig: a file cannot be written.
     """
     written = []
-    for task in (*TASKS, *WITHOUT_PROGRAM):
+    for task in TASKS:
         page = folder / f"{task}.md"
         with writing("--write", page):
             folder.mkdir(parents=True, exist_ok=True)
             page.write_text(page_text(task), encoding="utf-8")
         written.append(page)
-        if clips and task in TASKS:
+        if clips:
             written.append(write_clip(task, folder / f"{task}.webp"))
     return written
 
 
 def write_clip(task: str, file: Path) -> Path:
-    """Record a looping clip of the planner's first episode of a task's shipped config.
+    """Record a looping clip of the planner's first episode of a task's shipped config, of its first cell.
 
     Args:
         task: name of the task.
@@ -103,12 +96,12 @@ def write_clip(task: str, file: Path) -> Path:
     Raises:
         BadConfig: the file cannot be written.
     """
-    from ..configs import load_config, shipped_config
+    from ..configs import load_grid, shipped_config
     from .episodes.episode import run_episode
     from .episodes.scenarios import scenarios_of
     from .run.episode_jobs import made, policy_for
 
-    config = load_config(shipped_config(task))
+    config = load_grid(shipped_config(task)).cells[0]
     env = made(config, "rgb_array")
     policy = policy_for(env, config)
     pictures: list[Any] = []

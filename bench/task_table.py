@@ -30,7 +30,7 @@ class TaskFacts:
 
     Attributes:
         id: Gymnasium id of the environment.
-        error: error measure, see `Error`.
+        error: error measure, see `Error`; None if the environment tells only success.
         task_metrics: neutral metrics of the task, which favor no method by construction: name in `metric_table` to
             key in `info`.
         compared_segment: the segment of its demonstration whose motion is compared; "" if there is none.
@@ -40,7 +40,7 @@ class TaskFacts:
     """
 
     id: str
-    error: Error
+    error: Error | None
     task_metrics: dict[str, str]
     compared_segment: str = ""
     poured_into: int | None = None
@@ -83,5 +83,6 @@ TASKS = {
         demonstrated_task="shelve",
     ),
     "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, demonstrated_task="pour"),
+    "robosuite": TaskFacts("onedemo/Robosuite-v0", None, {}, upright=False),
 }
-"""All tasks by name."""
+"""All tasks by name; for "robosuite" see also `FAMILIES` of `configs.run_config`."""

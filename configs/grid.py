@@ -13,7 +13,18 @@ from pydantic import ValidationError
 
 from .dotted_keys import MISSING, at, having, leaves, merged, without
 from .errors import BadConfig, unknown_key
-from .run_config import CELL_KEYS, LATER, RUN_KEYS, SWITCHES, Default, RunConfig, RunSettings, digest_of, reason_of
+from .run_config import (
+    CELL_KEYS,
+    FAMILIES,
+    LATER,
+    RUN_KEYS,
+    SWITCHES,
+    Default,
+    RunConfig,
+    RunSettings,
+    digest_of,
+    reason_of,
+)
 from .shipped_files import shipped_demonstrations
 from .strict_yaml import COMMAND_LINE, load_mapping, with_overrides, with_switches
 
@@ -55,10 +66,11 @@ class Grid:
     def label(self, cell: RunConfig) -> str:
         """Return a cell in words: task, robot, level, method, and other swept keys."""
         values = cell.model_dump(mode="json")
-        more = [key for key in self.settings.sweep if key not in NAMING]
+        said = (*NAMING, *(f"env.{key}" for key in FAMILIES.get(cell.task, ())))
+        more = [key for key in self.settings.sweep if key not in said]
         found = {key: at(values, key) for key in more}
         named = [f"{key}={_worded(value)}" for key, value in found.items() if not (value is MISSING and key in LATER)]
-        return " ".join([*(values[key] for key in NAMING), *named])
+        return " ".join([cell.task_words, *(values[key] for key in NAMING[1:]), *named])
 
     def blame(self, key: str) -> str | Path:
         """Return the place where a key was written: the command line or the file."""

@@ -29,6 +29,8 @@ BESIDE = ("name", "video", "trajectories", "episodes")
 """Keys that do not affect the course of an episode."""
 IMPLIED: dict[str, dict[str, Any]] = {"S": {"key_poses": 6}, "T": {"tool": (0.1, 0.0, 0.0, 90.0)}}
 """Values implied by a level where the cell gives none."""
+FAMILIES: dict[str, dict[str, str]] = {"robosuite": {"task": "Lift", "range": "D0"}}
+"""Environments that are several tasks: the arguments that tell which, with their defaults."""
 LATER = ("key_poses", "tool")
 """Keys that are written, and part of the digest, only if they have a value."""
 
@@ -104,6 +106,12 @@ class RunConfig(BaseModel):
         if self.tool is not None and self.tool != implied.get("tool"):
             words.append("tool " + " ".join(f"{value:g}" for value in self.tool))
         return " ".join(words)
+
+    @property
+    def task_words(self) -> str:
+        """Name of the task in tables; of one of several in an environment what tells it apart: "Stack D1"."""
+        apart = FAMILIES.get(self.task, {})
+        return " ".join(str(self.env.get(key, default)) for key, default in apart.items()) or self.task
 
     def digest(self) -> str:
         """Return twelve hexadecimal digits of all values that affect the course of an episode: all but `BESIDE`."""

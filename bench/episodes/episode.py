@@ -136,7 +136,7 @@ def episode_record(
         index=scenario.index,
         seed=scenario.seed,
         method=config.method,
-        task=config.task,
+        task=config.task_words,
         robot=config.robot,
         level=scenario.level,
         success=success,

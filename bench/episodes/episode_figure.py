@@ -84,9 +84,14 @@ def _lines(seen: Showcase) -> list[tuple[np.ndarray, str, dict[str, Any]]]:
 
 def _groups(seen: Showcase) -> list[_Group]:
     """Return the groups of solids that are not empty, from back to front."""
-    shapes = [each.shape for each in seen.objects]
-    goals = [surface(shapes[k], Pose.from_vector(pose)) for k, pose in enumerate(seen.goals)]
-    start = [surface(shapes[k], Pose.from_vector(pose)) for k, pose in enumerate(seen.start)]
+    goals, start = (
+        [
+            surface(part.shape, part.pose)
+            for each, pose in zip(seen.objects, poses, strict=False)
+            for part in each.at(pose)
+        ]
+        for poses in (map(Pose.from_vector, seen.goals), map(Pose.from_vector, seen.start))
+    )
     above = [-np.inf, -np.inf, seen.table_height]
     furniture = [[np.maximum(p, above) for p in surface(each.shape, each.pose)] for each in seen.furniture]
     obstacles = [surface(each.shape, each.pose) for each in seen.obstacles.values()]

@@ -130,4 +130,5 @@ def _record(cell: RunConfig, scenario: dict[str, Any], rng: np.random.Generator)
 
 
 def _numbers(task: str) -> dict[str, list[float]]:
-    return {TASKS[task].error.key: [0.001]}
+    error = TASKS[task].error
+    return {error.key: [0.001]} if error else {}

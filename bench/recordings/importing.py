@@ -187,7 +187,7 @@ def _task(task: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
 
     if not task:
         return "", (), ()
-    if task not in TASKS:
-        return task, (), (f"{task!r} is none of the shipped tasks ({', '.join(TASKS)}): its motions have no names",)
+    if task not in PROGRAMS:
+        return task, (), (f"{task!r} is none of the shipped tasks ({', '.join(PROGRAMS)}): its motions have no names",)
     shown = TASKS[task].demonstrated_task or task
     return shown, PROGRAMS[task].SEGMENTS, ()

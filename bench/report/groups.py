@@ -61,6 +61,12 @@ class Group:
         """Conditions on which the group is compared with others."""
         return _setting(self.cell)
 
+    @property
+    def place(self) -> str:
+        """Place on the axis of a figure: the level; of one of several tasks in an environment also the task."""
+        task, _, level = self.setting
+        return level if task == self.cell.task else f"{task} {level}"
+
     @cached_property
     def success(self) -> Rate:
         """Rate of successes."""
@@ -114,7 +120,7 @@ def groups_of(run: Run) -> list[Group]:
 
 
 def _setting(cell: RunConfig) -> Setting:
-    return Setting(cell.task, cell.robot, cell.condition)
+    return Setting(cell.task_words, cell.robot, cell.condition)
 
 
 def _differing(cell: RunConfig, others: list[RunConfig]) -> str:
@@ -134,9 +140,18 @@ def _written(cell: RunConfig) -> dict[str, Any]:
 
 def groups_by_task(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:
     """Return the groups by task and robot."""
+    return _split(groups, lambda group: group.setting[:2])
+
+
+def groups_by_environment(groups: list[Group]) -> dict[tuple[str, str], list[Group]]:
+    """Return the groups by environment, which may have several tasks, and robot."""
+    return _split(groups, lambda group: (group.cell.task, group.cell.robot))
+
+
+def _split(groups: list[Group], key: Callable[[Group], tuple[str, str]]) -> dict[tuple[str, str], list[Group]]:
     found: dict[tuple[str, str], list[Group]] = {}
     for group in groups:
-        found.setdefault((group.cell.task, group.cell.robot), []).append(group)
+        found.setdefault(key(group), []).append(group)
     return found
 
 

@@ -42,9 +42,9 @@ CURVE = 200
 
 def failures(lines: list[Series]) -> Any:
     """Draw the shares of outcomes: one bar per level and method."""
-    rows = [(group.setting.level, line.label, group) for line in lines for group in line.groups if group.records]
+    rows = [(group.place, line.label, group) for line in lines for group in line.groups if group.records]
     rows.sort(key=lambda row: rank(row[0]))
-    levels = list(dict.fromkeys(level for level, _, _ in rows))
+    levels, known = list(dict.fromkeys(level for level, _, _ in rows)), {group.setting.level for _, _, group in rows}
     outcomes = {outcome for _, _, group in rows for outcome in group.outcomes}
     height = min(TALLEST, 0.55 + 0.155 * len(rows) + 0.1 * len(levels))
     figure, axes = new_figure(height, len(outcomes), COLUMNS)
@@ -59,7 +59,8 @@ def failures(lines: list[Series]) -> Any:
             left += share
     for level in levels:
         middle = places[[k for k, row in enumerate(rows) if row[0] == level]].mean()
-        axes.text(1.02, middle, level, ha="left", va="center", fontweight="bold", clip_on=False)
+        words = level if level in known else level.replace(" ", "\n", 1)  # a task's name is long
+        axes.text(1.02, middle, words, ha="left", va="center", fontweight="bold", clip_on=False)
     axes.set_yticks(places, [label for _, label, _ in rows])
     axes.set(xlim=(0.0, 1.0), ylim=(places[-1] + 0.6, places[0] - 0.6), xlabel="share of episodes")
     points_per_row = 72.0 * (height - 0.55) / (places[-1] + 1.0)

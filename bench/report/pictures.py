@@ -9,7 +9,7 @@ from typing import Any
 from ..document.document import Picture, Pictures
 from ..document.untrusted_text import slug
 from ..drawing.figure_style import saved, styled
-from .groups import Group, groups_by_task
+from .groups import Group, groups_by_environment, groups_by_task
 from .outcome_figures import clearance, failures, timing
 from .rate_figures import Series, by_level, by_speed, series_of
 from .read_runs import Run, speeds_of
@@ -17,10 +17,12 @@ from .read_runs import Run, speeds_of
 FOLDER = "figures"
 KINDS = ("success", "speed", "failures", "clearance", "timing")
 """Kinds of figures, one for each question; file names begin with them."""
+SIDE_BY_SIDE = ("success", "failures")
+"""Kinds that show every level by itself, hence all tasks of an environment; the others pool the levels of a task."""
 
 
 def drawn(run: Run, groups: list[Group], output: Path) -> dict[str, list[Picture]]:
-    """Draw all figures, one per kind, task and robot if there are data, and write them as PNG and PDF.
+    """Draw all figures, one per kind, task or environment, and robot if there are data, and write them as PNG and PDF.
 
     Args:
         run: the run.
@@ -40,11 +42,12 @@ def drawn(run: Run, groups: list[Group], output: Path) -> dict[str, list[Picture
     }
     found: dict[str, list[Picture]] = {kind: [] for kind in KINDS}
     with styled():
-        for (task, robot), some in groups_by_task(groups).items():
-            lines = series_of(group for group in some if group.records)
-            title = f"{task}, {robot}"
-            for kind in KINDS if lines else ():
-                figure = draw[kind](lines)
+        for kind in KINDS:
+            parts = groups_by_environment(groups) if kind in SIDE_BY_SIDE else groups_by_task(groups)
+            for (task, robot), some in parts.items():
+                lines = series_of(group for group in some if group.records)
+                title = f"{task}, {robot}"
+                figure = draw[kind](lines) if lines else None
                 if figure is not None:
                     figure.axes[0].set_title(title)
                     stem = f"{FOLDER}/{kind}-{slug(task)}-{slug(robot)}"

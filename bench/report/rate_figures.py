@@ -15,6 +15,8 @@ from .groups import ORDERED, Group, rank
 
 HEIGHT, COLUMNS = 2.2, 3
 """Height of a figure without its legend [inch]; number of columns of the legend."""
+SLANTED, ROOM = 25.0, 0.55
+"""Slope [degrees] of ticks that also name a task, and room for them [inch]."""
 SPREAD = 0.62
 """Fraction of the distance between two ticks over which methods are spread, so that their intervals do not overlap."""
 EDGES = (0.0, 0.1, 0.2, 0.3)
@@ -63,13 +65,14 @@ def share_axis(axes: Any, label: str) -> None:
 
 
 def by_level(lines: list[Series]) -> Any:
-    """Draw safe success against level."""
-    levels = list(dict.fromkeys(g.setting.level for line in lines for g in line.groups))
+    """Draw safe success against level, and task where an environment has several."""
+    levels = list(dict.fromkeys(g.place for line in lines for g in line.groups))
     levels.sort(key=rank)
-    figure, axes = new_figure(HEIGHT, len(lines), COLUMNS)
+    tasks = any(g.place != g.setting.level for line in lines for g in line.groups)
+    figure, axes = new_figure(HEIGHT + ROOM * tasks, len(lines), COLUMNS)
     handles = []
     for line, shift in zip(lines, _shifts(len(lines)), strict=True):
-        known = {group.setting.level: group.safe_success for group in line.groups if group.records}
+        known = {group.place: group.safe_success for group in line.groups if group.records}
         steps = [level for level in levels if level in known and level in ORDERED]
         alone = [level for level in levels if level in known and level not in ORDERED]
         for some, joined in ((steps, True), (alone, False)):
@@ -79,7 +82,11 @@ def by_level(lines: list[Series]) -> Any:
                 if len(handles) == 0 or handles[-1][1] != line.label:
                     handles.append((drawn, line.label))
     axes.set_xticks(range(len(levels)), levels)
-    axes.set(xlim=(-0.5, len(levels) - 0.5), xlabel="level")
+    axes.set(xlim=(-0.5, len(levels) - 0.5), xlabel="task and level" if tasks else "level")
+    if tasks:
+        axes.tick_params(axis="x", labelrotation=SLANTED)
+        for tick in axes.get_xticklabels():
+            tick.set(ha="right", rotation_mode="anchor")
     share_axis(axes, "safe success")
     legend_above(figure, [h for h, _ in handles], [label for _, label in handles], COLUMNS)
     return figure

@@ -18,7 +18,7 @@ from ..method_table import REFERENCE
 from ..metrics.metric_table import METRICS
 from ..statistics import FEWEST
 from . import tables
-from .groups import UNSAFE, Group, groups_by_task, groups_of, metric_tests, success_tests
+from .groups import UNSAFE, Group, groups_of, metric_tests, success_tests
 from .pictures import drawn, with_caption
 from .read_runs import Run, merged, read_run
 from .summary import SUMMARY, summary_row, write_summary
@@ -159,7 +159,7 @@ def _opening(run: Run, groups: list[Group]) -> list[Block]:
     missing = sum(max(0, group.planned - len(group.records)) for group in groups)
     cells = list(run.cells.values())
     conditions, labels = [cell.condition for cell in cells], [group.label for group in groups]
-    words = {"tasks": [cell.task for cell in cells], "levels": conditions, "methods": labels}
+    words = {"tasks": [cell.task_words for cell in cells], "levels": conditions, "methods": labels}
     items = [
         *(f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in words.items()),
         "Success is judged by the simulator; safe success is success without any unwanted contact.",
@@ -194,7 +194,8 @@ def _failures(groups: list[Group], run: Run, output: Path) -> list[Block]:
 def _metrics(groups: list[Group]) -> list[Block]:
     blocks: list[Block] = []
     used: list[str] = []
-    for (task, _), some in groups_by_task(groups).items():
+    for task in dict.fromkeys(group.cell.task for group in groups):
+        some = [group for group in groups if group.cell.task == task]
         names = tables.known_metrics(some)
         if names:
             main = [name for name in names if METRICS[name].paired]

@@ -29,12 +29,13 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
     successes = sum(record.success for record in records)
     low, high = wilson(successes, len(records))
     error = TASKS[config.task].error
-    worst = [error.factor * max(record.numbers[error.key]) for record in records if record.success]
+    successful = [record for record in records if record.success]
+    worst = [error.factor * max(record.numbers[error.key]) for record in successful] if error else []
     timed = [record for record in records if max(record.tick_us) > 0.0]
     clearances = [1e3 * record.clearance for record in records if record.clearance is not None]
     return {
         "method": config.method,
-        "task": config.task,
+        "task": config.task_words,
         "robot": config.robot,
         "level": config.condition,
         "episodes": len(records),
@@ -43,7 +44,7 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
         "wilson_low": round(low, 4),
         "wilson_high": round(high, 4),
         **_middle_and_most("seconds", [record.seconds for record in timed]),
-        "error": f"{error.words} [{error.unit}]",
+        "error": f"{error.words} [{error.unit}]" if error else None,
         **_middle_and_most("error", worst),
         **_middle_and_most("tick_us", [record.tick_us[0] for record in timed]),
         "tick_us_p99": _middle([record.tick_us[1] for record in timed]),
@@ -83,18 +84,24 @@ def verdict(row: dict[str, Any]) -> list[str]:
     """Return the lines about a cell for the terminal."""
     failures = ", ".join(f"{reason} {count}" for reason, count in row["failures"].items()) or "none"
     times = f"{_said(row['tick_us_median'], '.0f')} us per tick (median), {_said(row['tick_us_p99'], '.0f')} us (p99)"
-    what, _, unit = row["error"].rpartition(" [")
-    most = row["error_max"]
-    largest = "no success, so no error" if most is None else f"{what} {most:.1f} {unit[:-1]} in the successes"
     return [
         f"{row['successes']} of {row['episodes']} succeeded at {row['level']} "
         f"(Wilson 95 %: {row['wilson_low']:.2f} to {row['wilson_high']:.2f}), "
         f"{row['safe_successes']} without any unwanted contact",
-        f"{_said(row['seconds_median'])} s simulated per episode (median), {largest}",
+        f"{_said(row['seconds_median'])} s simulated per episode (median){_largest(row)}",
         f"planner {times}; failures: {failures}",
         *why_failed(row),
         *_beside_obstacles(row),
     ]
+
+
+def _largest(row: dict[str, Any]) -> str:
+    """Return the largest error in words; "" if the task has no error measure."""
+    if row["error"] is None:
+        return ""
+    what, _, unit = row["error"].rpartition(" [")
+    most = row["error_max"]
+    return ", no success, so no error" if most is None else f", {what} {most:.1f} {unit[:-1]} in the successes"
 
 
 def why_failed(row: dict[str, Any]) -> list[str]:

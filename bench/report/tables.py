@@ -117,7 +117,7 @@ def metrics(groups: list[Group], names: list[str], title: str = "") -> Table:
     """Return a table of interquartile means of some metrics.
 
     Args:
-        groups: groups of one task.
+        groups: groups of one task, or of all in one environment.
         names: names of the metrics.
         title: title of a collapsed table; "": always shown.
     """

@@ -78,7 +78,7 @@ def _cell(group: Group) -> list[Any]:
     metrics = [_value(interquartile_mean(known) if len(known := group.values(name)) else None) for name in METRICS]
     ticks = list(zip(*(record.tick_us[:3] for record in group.records), strict=True))
     times = [median(ticks[0]), median(ticks[1]), max(ticks[2])] if ticks else [None] * 3
-    words = [csv_text(word) for word in (cell.digest(), cell.task, cell.robot, cell.condition, cell.method)]
+    words = [csv_text(word) for word in (cell.digest(), cell.task_words, cell.robot, cell.condition, cell.method)]
     touching, refused = sum(r.contacts > 0 for r in group.records), sum(r.refused for r in group.records)
     return [*words, group.planned, count, *rates, touching, refused, csv_text(listed), *metrics, *map(_value, times)]
 

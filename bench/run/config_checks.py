@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import lru_cache, partial
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from ...baselines.own_policy import is_own
 from ...configs import BadConfig, Grid, RunConfig
 from ...configs.errors import unknown_key
-from ...planner.errors import BadDemonstration
+from ...configs.run_config import FAMILIES
+from ...planner.errors import BadDemonstration, BadOption, UnknownName
 from ..recordings.robot_checks import robot_facts
 from ..task_table import TASKS
 
@@ -41,6 +42,7 @@ def check_grid(grid: Grid) -> None:
         for key in known:
             check_name(grid.blame(key), key, getattr(cell, key), known)
         _check_arguments(cell, grid)
+        _check_key_poses(cell, grid)
         _check_settings(cell, grid)
     for cell in {(cell.task, cell.demonstration): cell for cell in grid.cells}.values():
         fitting_demonstration(cell)
@@ -108,6 +110,31 @@ def check_env(cell: RunConfig, source: str | Path) -> None:
     for key in cell.env:
         if key not in known:
             raise BadConfig(source, f"env.{key}", f"{unknown_key(key, known)} (arguments of {name})")
+    if cell.task in FAMILIES:
+        _check_guest(cell, source)
+
+
+def _check_guest(cell: RunConfig, source: str | Path) -> None:
+    """Refuse a task or a range that robosuite's environment does not have."""
+    from ...envs.guests.guest_scene import check_guest
+    from ...envs.guests.task_facts import wide_range
+
+    given = {**FAMILIES[cell.task], **cell.env}
+    checks = {"task": check_guest, "range": partial(wide_range, given["task"])}
+    for key, check in checks.items():
+        try:
+            check(given[key])
+        except (BadOption, UnknownName) as error:
+            raise BadConfig(source, f"env.{key}", getattr(error, "reason", str(error))) from None
+
+
+def _check_key_poses(cell: RunConfig, grid: Grid) -> None:
+    """Refuse key poses in a task that knows no segments."""
+    from ...baselines.screw_policy import PROGRAMS
+
+    if cell.key_poses is not None and cell.task not in PROGRAMS:
+        reason = f"are those of named segments, and {cell.task} is done without names: leave key_poses and level S out"
+        raise BadConfig(grid.blame("key_poses"), "key_poses", reason)
 
 
 def _check_settings(cell: RunConfig, grid: Grid) -> None:
@@ -129,8 +156,10 @@ def _check_settings(cell: RunConfig, grid: Grid) -> None:
 def fitting_demonstration(cell: RunConfig) -> Demonstration:
     """Return the demonstration of a cell, checked against the cell's task.
 
+    A task that has no program needs no names: a skill must be found in the demonstration.
+
     Raises:
-        BadDemonstration: the file is unreadable, belongs to another task or lacks a segment.
+        BadDemonstration: the file is unreadable, belongs to another task, lacks a segment or shows no skill.
         UnknownName: no such demonstration is shipped.
     """
     from ...baselines.screw_policy import PROGRAMS
@@ -139,6 +168,19 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
 
     file = demonstration_path(cell.demonstration)
     demonstration = load_demonstration(cell.demonstration)
+    if cell.task in PROGRAMS:
+        _check_names(file, demonstration, cell)
+    else:
+        _check_skill(demonstration)
+    if not is_shipped(file):  # those are compared by a test
+        _check_robot(file, demonstration)
+    return demonstration
+
+
+def _check_names(file: Path, demonstration: Demonstration, cell: RunConfig) -> None:
+    """Refuse a demonstration of another task, or without the segments that the program of the task looks at."""
+    from ...baselines.screw_policy import PROGRAMS
+
     task, segments = TASKS[cell.task].demonstrated_task or cell.task, PROGRAMS[cell.task].SEGMENTS
     if demonstration.task != task:
         raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
@@ -149,9 +191,6 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
             reason = f"{name!r} is missing; {task!r} needs {', '.join(segments)}, there are: {there}"
             raise BadDemonstration(file, "segment_names", reason)
     _check_content(file, demonstration, PROGRAMS[cell.task])
-    if not is_shipped(file):  # those are compared by a test
-        _check_robot(file, demonstration)
-    return demonstration
 
 
 def _check_content(file: Path, demonstration: Demonstration, program: Any) -> None:
@@ -166,6 +205,14 @@ def _check_content(file: Path, demonstration: Demonstration, program: Any) -> No
         if demonstration.gripper is None or after >= len(demonstration.gripper):
             reason = f"says nothing about how the hand opens after {program.RELEASE!r}, which this task needs"
             raise BadDemonstration(file, "gripper", reason)
+
+
+@lru_cache(maxsize=32)
+def _check_skill(demonstration: Demonstration) -> None:
+    """Refuse a demonstration in which no skill is found; of each one this is looked at once."""
+    from ...baselines.programs.task_skills import skill_of
+
+    skill_of(demonstration)
 
 
 @lru_cache(maxsize=32)

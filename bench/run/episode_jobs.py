@@ -242,7 +242,7 @@ def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str,
         index=scenario.index,
         seed=scenario.seed,
         method=config.method,
-        task=config.task,
+        task=config.task_words,
         robot=config.robot,
         level=config.level,
         success=False,
@@ -295,7 +295,7 @@ def show(policy: Policy, config: RunConfig, folder: Path) -> Answer:
     finally:
         env.close()
     among = "" if config.obstacles in (None, "none") else f", obstacles {config.obstacles}"
-    where = f"{config.task}, {config.robot}, {config.condition}{among}"
+    where = f"{config.task_words}, {config.robot}, {config.condition}{among}"
     shown = "no demonstration" if config.method in WITHOUT_DEMONSTRATION else "one demonstration"
     title = f"{where}, seed {config.seed}: {shown}, {config.method}"
     draw_episode(seen, title, [figure, figure.with_suffix(".pdf")])

@@ -70,6 +70,18 @@ class GuestScene:
         return guest_scene, (self.task, self.scene.robot.name, self.gripper)
 
 
+def check_guest(task: object) -> None:
+    """Refuse what is no name of a robosuite task; nothing is compiled.
+
+    Raises:
+        UnknownName: robosuite has no such task for one arm.
+        BadOption: the task cannot be made.
+    """
+    with robosuite_library():
+        from . import robosuite_task
+    robosuite_task.check_task(task)
+
+
 def guest_scene(task: object, robot: object, gripper: object) -> GuestScene:
     """Return the scene of a robosuite task; compiled once per process.
 

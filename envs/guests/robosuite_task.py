@@ -144,7 +144,21 @@ def task_names() -> tuple[str, ...]:
     )
 
 
-def task_env(task: object, robot: str, gripper: str, slots: int) -> Any:
+def check_task(task: object) -> None:
+    """Refuse what is no name of a task that can be made.
+
+    Raises:
+        UnknownName: robosuite has no such task for one arm.
+        BadOption: the task cannot be made.
+    """
+    known = task_names()
+    if isinstance(task, str) and task in REFUSED:
+        raise BadOption("task", f"{task} cannot be made: {REFUSED[task]}; those that can: {', '.join(known)}")
+    if task not in known:
+        raise UnknownName("robosuite task for one arm", task, known)
+
+
+def task_env(task: Any, robot: str, gripper: str, slots: int) -> Any:
     """Return robosuite's environment of a task.
 
     Args:
@@ -157,11 +171,7 @@ def task_env(task: object, robot: str, gripper: str, slots: int) -> Any:
         UnknownName: robosuite has no such task for one arm.
         BadOption: the task cannot be made, or robosuite refuses the robot.
     """
-    known = task_names()
-    if not isinstance(task, str) or task not in known:
-        if isinstance(task, str) and task in REFUSED:
-            raise BadOption("task", f"{task} cannot be made: {REFUSED[task]}; those that can: {', '.join(known)}")
-        raise UnknownName("robosuite task for one arm", task, known)
+    check_task(task)
     ROBOSUITE_DEFAULT_LOGGER.setLevel("ERROR")
     base: Any = REGISTERED_ENVS[task]
     kind: Any = type(base)(f"{PREFIX}{task}", (GuestTask, base), {"slots": slots})

@@ -15,8 +15,8 @@ from onedemo.baselines.motion.tool_frame import ToolFrameMotion
 from onedemo.bench.geometric.metrics import curve_gap
 from onedemo.bench.run.episode_jobs import policy_for
 from onedemo.bench.task_table import TASKS
-from onedemo.configs.grid import load_config
-from onedemo.configs.run_config import RunConfig
+from onedemo.configs.grid import load_grid
+from onedemo.configs.run_config import FAMILIES, RunConfig
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
 from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import key_poses, resampled
@@ -26,7 +26,7 @@ TICKS = 100
 
 @pytest.fixture(scope="module", params=TASKS)
 def task_env(request):
-    config = load_config(shipped_config(request.param))
+    config = load_grid(shipped_config(request.param)).cells[0]
     made = gym.make(TASKS[config.task].id, level="L1", **config.env)
     yield made, config
     made.close()
@@ -76,6 +76,8 @@ def begun(env, policy):
 def test_levels_s_and_t_are_what_they_are_called(task_env, name):
     """A cell of these levels makes another policy of the same name, which takes up the task as well."""
     env, config = task_env
+    if config.task in FAMILIES:
+        pytest.skip("has no segments of which key poses could be shown: tests/bench/run/test_guest_cells.py")
     values = {**config.model_dump(mode="json"), "method": name}
     nominal, sparse, turned = (
         policy_for(env, RunConfig.model_validate({**values, "level": level})) for level in ("L1", "S", "T")

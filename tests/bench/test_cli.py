@@ -17,8 +17,7 @@ import pytest
 from onedemo.bench.cli import main
 from onedemo.bench.episodes.episode_records import read_records
 from onedemo.bench.perf import command as perf
-from onedemo.bench.perf.tasks import step_line
-from onedemo.bench.task_table import TASKS
+from onedemo.bench.perf.tasks import OWN, step_line
 from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.planner.imitation.demonstration_files import read_demonstration, save_demonstration
 
@@ -268,7 +267,7 @@ def test_a_file_that_cannot_be_written_after_all_is_one_line(monkeypatch, capsys
     assert err.strip().endswith("x.json cannot be written: No space left on device")
 
 
-@pytest.mark.parametrize("task", sorted(TASKS))
+@pytest.mark.parametrize("task", sorted(OWN))
 def test_the_two_scenes_of_a_step_line_go_the_same_way(task):
     """The line itself fails if they do not; its value depends on the machine."""
     assert perf.GROUPS["step"][step_line(task)]().value > 0.5

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from onedemo.bench.task_pages import WITHOUT_PROGRAM, page_text, summary_of
+from onedemo.bench.task_pages import page_text, summary_of
 from onedemo.bench.task_table import TASKS
 from onedemo.envs import IDS
 
@@ -25,14 +25,5 @@ def test_a_page_is_its_docstring_and_has_all_sections_and_a_clip(task):
     assert summary_of(TASKS[task].id) in page
 
 
-@pytest.mark.parametrize("task", sorted(WITHOUT_PROGRAM))
-def test_a_page_without_a_program_is_its_docstring(task):
-    page = (PAGES / f"{task}.md").read_text(encoding="utf-8")
-    assert page == page_text(task), "run: make docs"
-    for section in SECTIONS:
-        assert f"\n## {section}\n" in page, section
-    assert "onedemo run" not in page and ".webp" not in page
-
-
 def test_every_environment_has_a_page():
-    assert {facts.id for facts in TASKS.values()} | set(WITHOUT_PROGRAM.values()) == set(IDS)
+    assert {facts.id for facts in TASKS.values()} == set(IDS)
