@@ -31,7 +31,7 @@ IMPLIED: dict[str, dict[str, Any]] = {"S": {"key_poses": 6}, "T": {"tool": (0.1,
 """Values implied by a level where the cell gives none."""
 FAMILIES: dict[str, dict[str, str]] = {"robosuite": {"task": "Lift", "range": "D0"}}
 """Environments that are several tasks: the arguments that tell which, with their defaults."""
-LATER = ("key_poses", "tool")
+LATER = ("key_poses", "tool", "contents")
 """Keys that are written, and part of the digest, only if they have a value."""
 
 
@@ -63,6 +63,8 @@ class RunConfig(BaseModel):
         video: whether to make videos: of the first failure of each kind, and of the first episode of a single cell.
         trajectories: whether to keep the measurements of every tick, one .npz per episode.
         settings: settings of the method, with its own keys.
+        contents: first digits of the SHA-256 of the files of one's own that decide: demonstration, what is said of its
+            skill, modules; found when the cell is run, and demanded if it is written; None: there are none.
     """
 
     model_config = STRICT
@@ -83,6 +85,7 @@ class RunConfig(BaseModel):
     video: bool = True
     trajectories: bool = False
     settings: dict[str, Any] = Field(default_factory=dict)
+    contents: Annotated[str, Field(pattern="^[0-9a-f]{12}$")] | None = None
 
     @model_validator(mode="before")
     @classmethod

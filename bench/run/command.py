@@ -17,6 +17,7 @@ from ..workers.executors import executor_for
 from .actors_used import with_actors
 from .comparison import Comparison
 from .config_checks import check_grid
+from .contents_used import with_contents
 from .episode_jobs import EpisodeJobs
 from .finish import film, report, show
 from .run_progress import RunProgress
@@ -53,7 +54,7 @@ def run_config(
     source, part = config_path(config), parsed_shard(shard)
     grid = load_grid(source, overrides)
     check_grid(grid)
-    grid = with_actors(grid)
+    grid = with_contents(with_actors(grid))
     folder = output / f"{grid.name}-{grid.digest()}"
     err = console(stderr=True, quiet=quiet)
 
