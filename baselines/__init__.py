@@ -36,6 +36,8 @@ if TYPE_CHECKING:
         PolicyReport as PolicyReport,
     )
     from .program_policy import ProgramPolicy as ProgramPolicy
+    from .recording.scripted_recorder import ScriptedMotion as ScriptedMotion
+    from .recording.scripted_recorder import Waypoint as Waypoint
     from .safe_actions import SafeActions as SafeActions
     from .screw_policy import ScrewPolicy as ScrewPolicy
     from .screw_policy import ScrewSettings as ScrewSettings
@@ -56,6 +58,8 @@ __all__ = [
     "SafeActions",
     "ScrewPolicy",
     "ScrewSettings",
+    "ScriptedMotion",
+    "Waypoint",
     "actor_of",
     "load_actor",
     "make_policy",
@@ -96,6 +100,10 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
                 "PolicyReport",
             ),
             ".program_policy": ("ProgramPolicy",),
+            ".recording.scripted_recorder": (
+                "ScriptedMotion",
+                "Waypoint",
+            ),
             ".safe_actions": ("SafeActions",),
             ".screw_policy": (
                 "ScrewPolicy",

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from copy import deepcopy
-from importlib import import_module
-from pathlib import Path
 from typing import Any, cast
 
 from ..configs import BadConfig
 from ..envs import TaskDescription
+from ..envs.dotted_names import BadDottedName, imported, is_dotted, said
 from ..planner import Demonstration
 from ..planner.errors import OneDemoError
 from .policy import Policy
@@ -20,7 +18,7 @@ FORM = "my_package.my_module:MyPolicy"
 
 def is_own(name: str) -> bool:
     """Return whether a method is a dotted path instead of the name of a shipped policy."""
-    return ":" in name
+    return is_dotted(name)
 
 
 def own_policy(name: str, task: TaskDescription, demonstration: Demonstration, settings: Mapping[str, Any]) -> Policy:
@@ -37,7 +35,10 @@ def own_policy(name: str, task: TaskDescription, demonstration: Demonstration, s
     Raises:
         BadConfig: no such module or name, or the result is no policy.
     """
-    make = _named(name)
+    try:
+        make = imported(name, FORM)
+    except BadDottedName as error:
+        raise BadConfig("method", name, error.reason) from error
     if not callable(make):
         raise BadConfig("method", name, f"is a {type(make).__name__}, not a class or function")
     try:
@@ -45,31 +46,7 @@ def own_policy(name: str, task: TaskDescription, demonstration: Demonstration, s
     except OneDemoError:
         raise
     except Exception as error:
-        raise BadConfig("method", name, f"called with task, demonstration and settings: {_said(error)}") from error
+        raise BadConfig("method", name, f"called with task, demonstration and settings: {said(error)}") from error
     if not callable(getattr(policy, "predict", None)):
         raise BadConfig("method", name, f"gives a {type(policy).__name__} without a method predict")
     return cast(Policy, policy)
-
-
-def _named(name: str) -> Any:
-    module, _, attribute = name.partition(":")
-    if not module or not attribute.isidentifier() or not all(part.isidentifier() for part in module.split(".")):
-        raise BadConfig("method", name, f"is not of the form {FORM}")
-    here = str(Path.cwd())
-    sys.path.insert(0, here)
-    try:
-        found = import_module(module)
-    except Exception as error:
-        raise BadConfig("method", name, f"importing {module}: {_said(error)}") from error
-    finally:
-        sys.path.remove(here)
-    if not hasattr(found, attribute):
-        known = ", ".join(key for key in vars(found) if not key.startswith("_")) or "nothing"
-        raise BadConfig("method", name, f"{module} has no {attribute!r}; it has: {known}")
-    return getattr(found, attribute)
-
-
-def _said(error: Exception) -> str:
-    """Return an error as one line."""
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__

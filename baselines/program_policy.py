@@ -93,7 +93,7 @@ class ProgramPolicy(EpisodePolicy):
             raise BadOption("control_mode", f"{reason} control_mode={CONTROL_MODE!r}")
         self.settings = settings = at_rate(settings, task.control_dt)
         self.task, self.demonstration = settings.visible_part(task), demonstration
-        self.skill = None if task.name in PROGRAMS else skill_of(demonstration, task)
+        self.skill = None if task.name in PROGRAMS else task.skill or skill_of(demonstration, task)
         self.motion_method = settings.motion_method if tool is None else ToolFrameMotion(settings.motion_method, tool)
 
     def begin(self, observation: Observation) -> Episode:

@@ -33,7 +33,9 @@ app.add_typer(robot_commands.app, name="robot")
 
 @app.command()
 def run(
-    config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped config, like stack.")],
+    config: Annotated[
+        str, typer.Argument(help="A YAML file, a shipped config like stack, or a task my_tasks:MY_TASK.")
+    ],
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Parent of the run folder.")] = Path("runs"),
     shard: Annotated[str | None, typer.Option(help="Run only part i of n of the episodes, given as i/n.")] = None,
@@ -67,7 +69,9 @@ def run(
 
 @app.command()
 def train(
-    config: Annotated[str, typer.Argument(help="A YAML file, or the name of a shipped training, like reach_sac.")],
+    config: Annotated[
+        str, typer.Argument(help="A YAML file, a shipped training like reach_sac, or a task my_tasks:MY_TASK.")
+    ],
     overrides: Annotated[list[str] | None, typer.Argument(metavar="KEY=VALUE", help="Changes to the config.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Parent of the folder.")] = Path("trainings"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the folder, and errors.")] = False,
@@ -237,24 +241,33 @@ app.command()(mbm)
 
 @app.command()
 def tasks(
+    own: Annotated[
+        list[str] | None, typer.Argument(metavar="TASK", help="Dotted paths of your own tasks: only these.")
+    ] = None,
     write: Annotated[Path | None, typer.Option("--write", help="Write a page per task into this folder.")] = None,
     clips: Annotated[bool, typer.Option("--clips", help="With --write: also record a looping clip each.")] = False,
 ) -> None:
     """List the environments, or write a documentation page for each.
 
-    A page is the environment's docstring: actions, observations, rewards, starts, ends, options.
+    A page is the environment's docstring: actions, observations, rewards, starts, ends, options. That of a task of your
+    own is written from its data; without --write it is printed.
 
     Examples:
     - onedemo tasks
 
+    - onedemo tasks my_tasks:PEG_IN_HOLE
+
     - onedemo tasks --write docs/tasks --clips
     """
-    from .task_pages import list_tasks, write_pages
+    from .task_pages import list_tasks, own_page, write_own_pages, write_pages
 
     if write is None:
-        list_tasks()
+        if own:
+            console().print("\n\n".join(own_page(path) for path in own), markup=False, highlight=False, soft_wrap=True)
+        else:
+            list_tasks()
         return
-    for file in write_pages(write, clips=clips):
+    for file in write_own_pages(own, write) if own else write_pages(write, clips=clips):
         console().print(str(file))
 
 

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from ..configs.shipped_files import demonstration_path
-from ..planner.errors import UnknownName
 from .console import check_picture, check_writable, console, counted, labeled, writing
 
 Texts = list[str] | None
@@ -20,6 +19,7 @@ app = typer.Typer(
 @app.command()
 def check(
     file: Annotated[str, typer.Argument(help="A demonstration (.npz), or the name of a shipped one, like stack.")],
+    task: Annotated[str, typer.Option(help="Your own task, my_tasks:MY_TASK: its shapes make the skill sharper.")] = "",
 ) -> None:
     """Validate a demonstration and print its content.
 
@@ -46,7 +46,7 @@ def check(
         out.print(f"  {segment.name}", style="bold")
         for line in segment_lines(demo, segment):
             out.print(f"    {line}")
-    for line in skill_lines(demo):
+    for line in skill_lines(demo, task):
         out.print(line)
     warnings = warnings_of(demo)
     for warning in warnings:
@@ -69,6 +69,7 @@ def skill(
         False
     ),
     picture: Annotated[Path | None, typer.Option(help="Draw it (.png, .pdf or .svg).")] = None,
+    task: Annotated[str, typer.Option(help="Your own task, my_tasks:MY_TASK: its shapes make the skill sharper.")] = "",
 ) -> None:
     """Print the skill that a demonstration shows, and correct it.
 
@@ -85,13 +86,13 @@ def skill(
     from ..configs import load_demonstration
     from ..configs.skill_file import skill_file, with_said, write_corrections
     from ..planner.skills.infer import infer_skill
-    from .recordings.summary import lines_of
+    from .recordings.summary import WITHOUT_SHAPES, lines_of, skill_in_task
 
     path = demonstration_path(file)
     demo = load_demonstration(path)
     if change:
         demo = replace(demo, corrections=with_said(demo.corrections, change))
-    found = infer_skill(demo)
+    found = skill_in_task(demo, task) if task else infer_skill(demo)
     if picture is not None:
         from .recordings.skill_figure import draw_skill
 
@@ -99,7 +100,7 @@ def skill(
         with writing("--picture", picture):
             draw_skill(demo, found, picture)
     out = console()
-    for line in lines_of(found):
+    for line in lines_of(found, f"skill, in {task}:" if task else WITHOUT_SHAPES):
         out.print(line)
     if save:
         beside = skill_file(path)
@@ -240,28 +241,29 @@ def import_(
 
 @app.command()
 def record(
-    task: Annotated[str, typer.Argument(help="Task to demonstrate, like pour.")],
+    task: Annotated[str, typer.Argument(help="Task to demonstrate, like pour, or the dotted path of your own.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The demonstration to write (.npz).")],
 ) -> None:
     """Record the scripted demonstration of a task on the simulated robot.
 
-    A script moves the arm along waypoints (baselines/recording) under physics; the recording holds the positions
-    measured by the joint encoders. A demonstration that fails is not written.
+    A script moves the arm along waypoints (baselines/recording, or your task's script) under physics; the recording
+    holds the positions measured by the joint encoders. A demonstration that fails is not written.
 
-    Example: onedemo demo record pour --output pour.npz
+    Examples:
+    - onedemo demo record pour --output pour.npz
+
+    - onedemo demo record my_tasks:PEG_IN_HOLE --output peg_in_hole.npz
     """
     import gymnasium as gym
 
     from .. import envs  # noqa: F401  (registers the ids)
-    from ..baselines.recording.recorders import RECORDERS
+    from ..baselines.recording.recorders import recorder_of
     from ..planner import save_demonstration
-    from .task_table import TASKS
+    from .task_table import environment_id
 
     check_writable("--output", output)
-    if task not in RECORDERS:
-        raise UnknownName("scripted demonstration", task, RECORDERS)
-    recorder = RECORDERS[task]
-    env = gym.make(TASKS[task].id, level="L0", **recorder.scene)
+    recorder = recorder_of(task)
+    env = gym.make(environment_id(task), level="L0", **recorder.scene)
     with console(stderr=True).status("moving the arm"):
         demo = recorder.record(env.unwrapped)
     env.close()

@@ -6,6 +6,7 @@ import inspect
 from pathlib import Path
 from typing import Any
 
+from ..configs import BadConfig
 from ..envs import IDS
 from .console import console, writing
 from .task_table import TASKS
@@ -56,6 +57,48 @@ def page_text(task: str) -> str:
         rest,
         f"One run of the planner on it: `onedemo run {task}`.\n",
     ])  # fmt: skip
+
+
+def own_page(path: str) -> str:
+    """Return the Markdown page of a user's own task, given by its dotted path.
+
+    Raises:
+        BadConfig: no such module or name, or it is no task.
+        BadTask: the task cannot be used.
+    """
+    from ..envs import task_at
+    from ..envs.dotted_names import BadDottedName
+    from ..envs.tasks.describe import described
+
+    try:
+        return f"{described(task_at(path))}\n\nOne run of the planner on it: `onedemo run {path}`."
+    except BadDottedName as error:
+        raise BadConfig(path, "", error.reason) from None
+
+
+def write_own_pages(paths: list[str], folder: Path) -> list[Path]:
+    """Write the page of each of a user's own tasks.
+
+    Args:
+        paths: dotted paths.
+        folder: folder of the pages; made if missing.
+
+    Returns:
+        The files written.
+
+    Raises:
+        BadConfig: a file cannot be written, or a path names no task.
+    """
+    from ..envs import task_at
+
+    written = []
+    for path in paths:
+        text, page = own_page(path), folder / f"{task_at(path).name}.md"
+        with writing("--write", page):
+            folder.mkdir(parents=True, exist_ok=True)
+            page.write_text(text + "\n", encoding="utf-8")
+        written.append(page)
+    return written
 
 
 def write_pages(folder: Path, *, clips: bool) -> list[Path]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..envs import IDS
+from ..envs.dotted_names import is_dotted
 from ..envs.pour.geometry import TARGET
 
 
@@ -85,4 +87,41 @@ TASKS = {
     "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, demonstrated_task="pour"),
     "robosuite": TaskFacts("onedemo/Robosuite-v0", None, {}, upright=False),
 }
-"""All tasks by name; for "robosuite" see also `FAMILIES` of `configs.run_config`."""
+"""All shipped tasks by name; for "robosuite" see also `FAMILIES` of `configs.run_config`."""
+OWN = TaskFacts("", OFFSET, {}, upright=False)
+"""Facts about every task of a user's own; its environment id is known once its module is imported."""
+OWN_FREQUENCY = 50
+"""Default action frequency of users' own tasks [Hz]."""
+
+
+def facts_of(task: str) -> TaskFacts:
+    """Return the facts about a shipped task, or about a user's own, given by a dotted path; imports nothing."""
+    return OWN if is_dotted(task) else TASKS[task]
+
+
+def environment_id(task: str) -> str:
+    """Return the Gymnasium id of a task, registered; imports the module of a user's own task.
+
+    Raises:
+        BadDottedName: no such module or name, or it is no task.
+        BadTask: the task cannot be used.
+    """
+    if not is_dotted(task):
+        return TASKS[task].id
+    from ..envs import task_at
+
+    return task_at(task).id
+
+
+def seconds_of(task: str) -> float:
+    """Return the time limit of a task [s]; imports the module of a user's own task."""
+    if not is_dotted(task):
+        return IDS[TASKS[task].id].seconds
+    from ..envs import task_at
+
+    return task_at(task).seconds
+
+
+def frequency_of(task: str) -> int:
+    """Return the default action frequency of a task [Hz]."""
+    return OWN_FREQUENCY if is_dotted(task) else IDS[TASKS[task].id].frequency

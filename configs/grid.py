@@ -89,9 +89,22 @@ def load_grid(path: str | Path, overrides: list[str] | None = None) -> Grid:
     Raises:
         BadConfig: names the file, or the command line, and the key, and the allowed values.
     """
+    return grid_of(load_mapping(path), path, overrides)
+
+
+def grid_of(values: dict[str, Any], path: str | Path, overrides: list[str] | None = None) -> Grid:
+    """Check the content of a config file with `key=value` changes; see `load_grid`.
+
+    Args:
+        values: content of the file.
+        path: the file, or what stands for it in messages.
+        overrides: changes, each `key=value`.
+
+    Raises:
+        BadConfig: see `load_grid`.
+    """
     changes = overrides or []
     changed = tuple(text.partition("=")[0] for text in changes)
-    values = load_mapping(path)
     if isinstance(values.get("sweep"), dict):
         values["sweep"] = _unfolded(values["sweep"], path)
     values = with_switches(with_overrides(values, changes), changed, SWITCHES)

@@ -89,9 +89,23 @@ def load_training(path: str | Path, overrides: list[str] | None = None) -> Train
     Raises:
         BadConfig: names the file, or the command line, and the key, and the allowed values.
     """
+    return training_of(load_mapping(path), path, overrides)
+
+
+def training_of(written: dict[str, Any], path: str | Path, overrides: list[str] | None = None) -> TrainConfig:
+    """Check the content of a training config with `key=value` changes; see `load_training`.
+
+    Args:
+        written: content of the file.
+        path: the file, or what stands for it in messages.
+        overrides: changes, each `key=value`.
+
+    Raises:
+        BadConfig: see `load_training`.
+    """
     changes = overrides or []
     changed = {text.partition("=")[0].split(".")[0] for text in changes}
-    values = with_overrides(load_mapping(path), changes)
+    values = with_overrides(written, changes)
     for key in values:
         if key not in TRAIN_KEYS:
             source = COMMAND_LINE if key in changed else path

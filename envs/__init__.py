@@ -18,17 +18,43 @@ if TYPE_CHECKING:
     from .core.levels import LEVELS as LEVELS
     from .scene.robots import ROBOTS as ROBOTS
     from .simulation.moving_obstacles import ScheduledObstacle as ScheduledObstacle
+    from .tasks.model_files import parts_of_mesh as parts_of_mesh
+    from .tasks.model_files import parts_of_mjcf as parts_of_mjcf
+    from .tasks.places import At as At
+    from .tasks.places import Range as Range
+    from .tasks.registered import register_task as register_task
+    from .tasks.registered import task_at as task_at
+    from .tasks.success import SceneView as SceneView
+    from .tasks.success import Success as Success
+    from .tasks.success import Tolerance as Tolerance
+    from .tasks.task import Task as Task
+    from .tasks.things import Fixture as Fixture
+    from .tasks.things import Movable as Movable
+    from .tasks.things import Part as Part
 
 __all__ = [
     "FAILURES",
     "IDS",
     "LEVELS",
     "ROBOTS",
+    "At",
+    "Fixture",
+    "Movable",
+    "Part",
+    "Range",
+    "SceneView",
     "ScheduledObstacle",
+    "Success",
+    "Task",
     "TaskDescription",
     "TaskEnv",
     "TaskObject",
+    "Tolerance",
+    "parts_of_mesh",
+    "parts_of_mjcf",
     "register_all",
+    "register_task",
+    "task_at",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take any name for known
@@ -44,6 +70,29 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
             ".core.levels": ("LEVELS",),
             ".scene.robots": ("ROBOTS",),
             ".simulation.moving_obstacles": ("ScheduledObstacle",),
+            ".tasks.model_files": (
+                "parts_of_mesh",
+                "parts_of_mjcf",
+            ),
+            ".tasks.places": (
+                "At",
+                "Range",
+            ),
+            ".tasks.registered": (
+                "register_task",
+                "task_at",
+            ),
+            ".tasks.success": (
+                "SceneView",
+                "Success",
+                "Tolerance",
+            ),
+            ".tasks.task": ("Task",),
+            ".tasks.things": (
+                "Fixture",
+                "Movable",
+                "Part",
+            ),
         },
     )
 

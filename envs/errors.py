@@ -1,4 +1,4 @@
-"""Errors of environments: unusable actions, obstacles that do not fit, unavailable rendering."""
+"""Errors of environments: unusable tasks and actions, obstacles that do not fit, unavailable rendering."""
 
 from __future__ import annotations
 
@@ -13,6 +13,14 @@ class NoRoom(BadOption):
     def __init__(self, kind: object):
         self.kind = kind
         super().__init__("obstacles", f"no room for {kind!r} obstacles beside this start")
+
+
+class BadTask(OneDemoError, ValueError):
+    """A user's own task cannot be used."""
+
+    def __init__(self, name: object, key: str, reason: str):
+        self.name, self.key, self.reason = name, key, reason
+        super().__init__(f"task {name!r}: {key}: {reason}" if key else f"task {name!r}: {reason}")
 
 
 class BadAction(OneDemoError, ValueError):

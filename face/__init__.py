@@ -15,13 +15,17 @@ if TYPE_CHECKING:
     from .baselines.factory import make_policy as make_policy
     from .baselines.programs.task_skills import skill_of as skill_of
     from .configs.demonstrations import load_demonstration as load_demonstration
+    from .envs.tasks.registered import register_task as register_task
+    from .envs.tasks.task import Task as Task
     from .planner.errors import OneDemoError as OneDemoError
 
 __all__ = [
     "OneDemoError",
+    "Task",
     "__version__",
     "load_demonstration",
     "make_policy",
+    "register_task",
     "skill_of",
 ]
 
@@ -32,6 +36,8 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
             ".baselines.factory": ("make_policy",),
             ".baselines.programs.task_skills": ("skill_of",),
             ".configs.demonstrations": ("load_demonstration",),
+            ".envs.tasks.registered": ("register_task",),
+            ".envs.tasks.task": ("Task",),
             ".planner.errors": ("OneDemoError",),
         },
         packages=("baselines", "configs", "envs", "planner"),

@@ -20,7 +20,7 @@ ORDER = {
         errors lazy_names deferred_imports ranges arrays jit columns strict_json geometry models robot collision fitting
         control imitation skills recordings log escape safety judge planning reactive
     """,
-    "envs": "errors registration mujoco_library scene simulation core stack pour shelve guests",
+    "envs": "errors registration dotted_names mujoco_library scene simulation core stack pour shelve guests tasks",
     "configs": """
         errors shipped_files dotted_keys strict_yaml dataclass_settings skill_file demonstrations run_config
         learner_arguments grid train_config plan_scene_schema plan_scene

@@ -69,7 +69,7 @@ def test_the_packages_are_attributes_of_the_root():
     code = "import onedemo; print(onedemo.envs.IDS['onedemo/Stack-v0'].seconds, sorted(dir(onedemo)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.startswith(
-        "60.0 ['OneDemoError', '__version__', 'baselines', 'configs', 'envs', 'load_demonstration'"
+        "60.0 ['OneDemoError', 'Task', '__version__', 'baselines', 'configs', 'envs', 'load_demonstration'"
     )
 
 

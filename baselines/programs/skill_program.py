@@ -64,6 +64,8 @@ class SkillProgram:
                 yield from self._fetch_and_carry(phase, following)
             elif phase.kind == "reach":
                 yield from self._reach(phase)
+            elif phase.kind == "slide":
+                yield from self._slide(phase)
             elif phase.kind == "articulate":
                 yield from self._push(phase)
         yield from self._withdraw()
@@ -236,6 +238,23 @@ class SkillProgram:
         if phase.gripper == "close":
             yield from executor.wait(self.settings.settle)
             yield from executor.grip(CLOSE, self.settings.close)
+
+    def _slide(self, phase: Phase) -> Iterator[np.ndarray]:
+        """Move the object along what it touches as was commanded, from where the hand has brought it."""
+        executor, path, at = self.executor, self._paths[phase.name], self._pose(phase.reference)
+        tcp_from_object = executor.tcp_from(self._places.index(phase.thing)).inverse()
+        here = executor.arm.fk(executor.q)
+        shown = at @ phase.goals[0] @ path[-1].inverse()
+        # of the turns that look alike, the one that was chosen for the carry
+        ways = [path.moved(shown).with_tool(turn @ tcp_from_object) for turn in phase.right]
+        way = min(ways, key=lambda each: here.distance_to(each[0])[1])
+        yield from executor.follow(way, detours=False)
+        yield from executor.wait(self.settings.settle)
+        if phase.gripper == "open":
+            yield from executor.grip(OPEN, self.settings.open)
+            executor.release()
+            self._leaving = self._paths[next(each.name for each in self.skill.phases if each.thing == phase.thing)]
+            self._leaving = self._leaving.reversed()
 
     def _push(self, phase: Phase) -> Iterator[np.ndarray]:
         """Follow what was commanded where the hand pushes, relative to where the thing is."""

@@ -50,7 +50,8 @@ class ScriptedMotion(NamedTuple):
     Attributes:
         name: name of the segment.
         waypoints: waypoints in order.
-        reference: name of the object that the end is relative to, with its pose observed at the end; "": the world.
+        reference: name of the object or furniture that the end is relative to, with its pose observed at the end; "":
+            the world.
         held: name of the object in the hand; "" if the hand is empty.
         gripper: gripper action at the end: 1 closes, a negative value opens to that share of the width, 0 does nothing.
         pause: time [s] for the gripper action.
@@ -72,6 +73,7 @@ class _Recorder:
         self.observation, self.gripper, self.succeeded = observation, gripper, False
         self.q = observation["joint_positions"][0].copy()
         self.joints, self.commands = [self.q.copy()], [gripper]
+        self.sent, self.objects = [self.q.copy()], [observation["object_pose"].copy()]
         self.info: dict[str, Any] = {}
         self._free = 0
 
@@ -82,6 +84,7 @@ class _Recorder:
         self.succeeded |= bool(self.info["success"])
         self.joints.append(self.observation["joint_positions"][0].copy())
         self.commands.append(self.gripper)
+        self.objects.append(self.observation["object_pose"].copy())
 
     def go(self, waypoint: Waypoint) -> None:
         """Move to a waypoint and wait there."""
@@ -89,21 +92,33 @@ class _Recorder:
         for q in _joints_to(self.arm, self.q, waypoint, dt):
             self.step((q - self.q) / dt)
             self.q = q
+            self.sent.append(q)
         self.wait(waypoint.hold)
 
     def wait(self, seconds: float) -> None:
         """Stand still."""
         for _ in range(round(seconds / self.env.control_dt)):
             self.step(np.zeros(self.arm.dof))
+            self.sent.append(self.q)
+
+    def fixtures(self) -> dict[str, Pose]:
+        """Return the poses of the furniture by name."""
+        names = [each.name for each in self.env.task.furniture]
+        return {
+            name: Pose.from_vector(row) for name, row in zip(names, self.observation["furniture_pose"], strict=True)
+        }
 
     def motion(self, motion: ScriptedMotion) -> Segment:
         """Execute a motion and return its segment."""
         start, names = max(self._free, len(self.joints) - 1), [each.name for each in self.env.task.objects]
+        fixed = [each.name for each in self.env.task.furniture]
         for waypoint in motion.waypoints:
             self.go(waypoint)
         self.wait(CATCH_UP)
         reference = Pose.identity()
-        if motion.reference:
+        if motion.reference in fixed:
+            reference = self.fixtures()[motion.reference]
+        elif motion.reference:
             reference = Pose.from_vector(self.observation["object_pose"][names.index(motion.reference)])
         stop = len(self.joints) - 1
         self._free = stop + 1
@@ -144,6 +159,7 @@ def recorded(
         info = recorder.info
         raise BadDemonstration(name, "script", f"no success: {info['stage']}, {info['failure_reason'] or 'unfinished'}")
     joints, arm, task = np.array(recorder.joints), recorder.arm, env.task
+    paths = np.swapaxes(np.array(recorder.objects), 0, 1)
     return Demonstration(
         name=name,
         task=task.name,
@@ -157,6 +173,9 @@ def recorded(
         gripper=np.array(recorder.commands),
         segments=segments,
         object_sizes={each.name: each.size for each in task.objects},
+        object_paths={each.name: PosePath.from_vectors(rows) for each, rows in zip(task.objects, paths, strict=True)},
+        fixtures=recorder.fixtures() if task.furniture else {},
+        commanded=PosePath(np.array([arm.fk(q).dq for q in recorder.sent])),
     )
 
 

@@ -36,7 +36,7 @@ FLOOR = 0.8
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class Spread:
     """Ranges of the random displacements of start and goal.
 
     Attributes:
@@ -54,11 +54,11 @@ class Range:
     obstacles: int = 0
 
 
-FAR = Range(0.15, np.deg2rad(60.0), 0.20, np.deg2rad(120.0))
+FAR = Spread(0.15, np.deg2rad(60.0), 0.20, np.deg2rad(120.0))
 LEVELS = {
-    "L1": Range(0.05, np.deg2rad(15.0), 0.10, np.deg2rad(30.0)),
+    "L1": Spread(0.05, np.deg2rad(15.0), 0.10, np.deg2rad(30.0)),
     "L2": FAR,
-    "L3": Range(FAR.start, FAR.start_yaw, FAR.goal, FAR.goal_yaw, 3),
+    "L3": Spread(FAR.start, FAR.start_yaw, FAR.goal, FAR.goal_yaw, 3),
 }
 
 
@@ -121,7 +121,7 @@ def drawn(index: int, seed: int) -> dict[str, Any]:
     raise BadOption("seed", f"{seed} gives no feasible scenario {index} ({name}, {level}) in {TRIES} draws")
 
 
-def _drawn_once(part: CarriedPart, far: Range, rng: np.random.Generator) -> tuple | None:
+def _drawn_once(part: CarriedPart, far: Spread, rng: np.random.Generator) -> tuple | None:
     """Draw start, goal, joints and obstacles; None if the arm cannot reach both ends or the obstacles do not fit."""
     shown = part.shown
     start = _moved(shown[0], shown[0].position, far.start, far.start_yaw, rng)

@@ -11,7 +11,7 @@ from ...configs import load_demonstration
 from ...planner import Demonstration, PosePath
 from ...planner.imitation.segmentation import resampled, trimmed
 from ...planner.judge.deviation import frechet, screw_gaps
-from ..task_table import TASKS
+from ..task_table import facts_of
 from .carry_segments import Carry, tilts
 from .trace import Trace
 
@@ -53,7 +53,7 @@ def shown(demonstration: Demonstration | None, task: str) -> DemonstrationShape 
         demonstration: the demonstration; None: no demonstration.
         task: name of the task.
     """
-    compared_segment = TASKS[task].compared_segment
+    compared_segment = facts_of(task).compared_segment
     segments = {} if demonstration is None else {segment.name: segment for segment in demonstration.segments}
     if demonstration is None or compared_segment not in segments:
         return None

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ...planner import Demonstration
-from ..task_table import TASKS
+from ..task_table import facts_of
 from .carry_segments import Carry, carries, carrying_tilt
 from .clearance import Solids
 from .demonstration_distance import deviation, end_of, length_of, shown, turning_of, way_ratio
@@ -40,7 +40,7 @@ def metrics_of(
         demonstration: demonstration that the carries are compared with; None: no comparison.
         success: verdict of the simulator.
     """
-    facts, near = TASKS[task], solids.clearance(trace)
+    facts, near = facts_of(task), solids.clearance(trace)
     found = carries(trace, facts.poured_into)
     tilt, tilting = carrying_tilt(trace, found) if facts.upright else (None, None)
     values: Metrics = {
@@ -72,7 +72,7 @@ def first_motion(trace: Trace) -> float | None:
 
 def _of_carries(trace: Trace, found: list[Carry], task: str, demonstration: Demonstration | None) -> Metrics:
     """Return means over the carries of an episode; for the deviation the maximum."""
-    facts, wanted = TASKS[task], shown(demonstration, task)
+    facts, wanted = facts_of(task), shown(demonstration, task)
     ends = [end_of(trace, carry, poured=facts.poured_into is not None) for carry in found]
     pairs = list(zip(found, ends, strict=True))
     speeds = [_speed(trace, carry, end) for carry, end in pairs]

@@ -183,10 +183,14 @@ def _check_sizes(recording: Recording, sizes: Mapping[str, np.ndarray]) -> None:
 def _task(task: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return the task of a demonstration, the names of the motions that it needs, and what to say about it."""
     from ...baselines.screw_policy import PROGRAMS
+    from ...envs import task_at
+    from ...envs.dotted_names import is_dotted
     from ..task_table import TASKS
 
     if not task:
         return "", (), ()
+    if is_dotted(task):
+        return task_at(task).name, (), ()
     if task not in PROGRAMS:
         return task, (), (f"{task!r} is none of the shipped tasks ({', '.join(PROGRAMS)}): its motions have no names",)
     shown = TASKS[task].demonstrated_task or task

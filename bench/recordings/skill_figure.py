@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...planner import Demonstration, Pose
-from ...planner.skills.articulations import FINGERS, articulations
-from ...planner.skills.grips import closings, grips
+from ...planner.skills.articulations import FINGERS, Articulation, articulations
+from ...planner.skills.grips import Grip, closings, grips
 from ...planner.skills.skill import START, Phase, Skill
+from ...planner.skills.slides import slides_from
 from ..drawing.figure_style import DOTS, FAINT, INK, legend_above, styled
 
 WIDTH, TIMES, PANEL = 7.0, 1.9, 2.0
@@ -22,10 +23,14 @@ ENTRIES = 4
 MOVES = 0.01
 """Displacement [m] from which an object is drawn as one that moves."""
 LINES = ("#1f4fd8", "#b5179e", "#007f5f", "#b35c00", "#5f3dc4", "#5c5c00")
-FACES = {"reach": "#e6eefc", "carry": "#fbe6f6", "articulate": "#fdf0dc", "withdraw": "#efefef"}
+FACES = {"reach": "#e6eefc", "carry": "#fbe6f6", "slide": "#fdf0dc", "articulate": "#fdf0dc", "withdraw": "#efefef"}
 MILLIMETERS = 1e3
 EDGE = 0.07
 """Share of the timeline at its ends in which no name has its middle."""
+
+
+OBJECTS = ("carry", "slide")
+"""Kinds of phases in which an object is what moves."""
 
 
 class Span(NamedTuple):
@@ -77,12 +82,22 @@ def spans_of(demonstration: Demonstration, skill: Skill) -> list[Span]:
     begin, found = 0, []
     for number, event in enumerate(events, 1):
         mine = [phase for phase in skill.phases if _number(phase) == number and phase.kind != "withdraw"]
-        for phase, (start, stop) in zip(mine, ((begin, event.held), (event.held, event.released)), strict=False):
+        edges = [begin, event.held, *_slide_begins(demonstration, event, mine), event.released]
+        for phase, start, stop in zip(mine, edges, edges[1:], strict=False):
             found.append(Span(phase.name, phase.kind, float(since[start]), float(since[stop])))
         begin = event.released
     if skill.phases and skill.phases[-1].kind == "withdraw":
         found.append(Span("withdraw", "withdraw", float(since[begin]), float(since[-1])))
     return found
+
+
+def _slide_begins(demonstration: Demonstration, event: Grip | Articulation, phases: list[Phase]) -> list[int]:
+    """Return the sample at which what was carried begins to slide, if it does."""
+    if not isinstance(event, Grip) or not any(phase.kind == "slide" for phase in phases):
+        return []
+    carry = next(phase for phase in phases if phase.kind == "carry")
+    begins = slides_from(demonstration, event, carry)
+    return [] if begins is None else [begins]
 
 
 def _number(phase: Phase) -> int:
@@ -123,7 +138,7 @@ def _draw_end(axes: Any, phase: Phase) -> None:
     goals = np.array([_from_the_side(local, place @ goal, phase.path[0]) for goal in phase.goals])
     if phase.reference == START:
         goals = points[-1:]
-    color = LINES[1] if phase.kind == "carry" else LINES[0]
+    color = LINES[1] if phase.kind in OBJECTS else LINES[0]
     axes.plot(*(MILLIMETERS * points.T), color=color, linewidth=1.4)
     axes.plot(*(MILLIMETERS * points[0]), "o", color=color, markerfacecolor="white")
     axes.plot(*(MILLIMETERS * goals.T), "x", color=color, markersize=5.0)
@@ -131,7 +146,7 @@ def _draw_end(axes: Any, phase: Phase) -> None:
     name = phase.reference if phase.reference != START else "where it began"
     axes.annotate(name, (0.0, 0.0), xytext=(5, 4), textcoords="offset points", fontsize=6.5, color=INK)
     count = len(phase.goals) * len(phase.left) * len(phase.right)
-    body = "object" if phase.kind == "carry" else "hand"
+    body = "object" if phase.kind in OBJECTS else "hand"
     axes.set_title(f"{phase.name}\n{body}, {count} ends" if count > 1 else f"{phase.name}\n{body}", fontsize=7.0)
     axes.margins(0.12)
     axes.set(xlabel="aside [mm]", ylabel="above [mm]")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...planner import Demonstration, Pose, Segment
-from ...planner.errors import BadDemonstration
+from ...planner.errors import BadDemonstration, UnknownName
 from ...planner.geometry.dualquat import screw_parameters
 from ...planner.imitation.demonstration_files import UNITS
 from ...planner.skills.describe import described
@@ -16,6 +17,7 @@ from ...planner.skills.skill import Skill
 from .robot_checks import robot_facts
 
 DIRECTIONS = {"up": (0, 0, 1), "down": (0, 0, -1), "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0)}
+WITHOUT_SHAPES = "skill, by what moved (in a task the shapes of things make it sharper):"
 STRAIGHT = 0.02
 """Turn [rad] below which a motion is called straight: its pitch would be a matter of noise."""
 
@@ -124,11 +126,18 @@ def segment_lines(demonstration: Demonstration, segment: Segment) -> list[str]:
     ]
 
 
-def skill_lines(demonstration: Demonstration) -> list[str]:
+def skill_lines(demonstration: Demonstration, task: str = "") -> list[str]:
     """Return the skill that a demonstration shows, in words, a line for each phase and what is known about it.
 
-    Shapes of things are unknown here: a task makes references and symmetries sharper.
+    Args:
+        demonstration: the demonstration.
+        task: dotted path of a user's own task, whose shapes make references and symmetries sharper; "": none.
+
+    Raises:
+        UnknownName, BadConfig: no such task.
     """
+    if task:
+        return lines_of(skill_in_task(demonstration, task), f"skill, in {task}:")
     if not demonstration.object_paths and not demonstration.other_joints:
         return []
     try:
@@ -138,9 +147,44 @@ def skill_lines(demonstration: Demonstration) -> list[str]:
     return lines_of(skill)
 
 
-def lines_of(skill: Skill) -> list[str]:
-    """Return a skill in words, a line for each phase and what is known about it."""
-    lines = ["skill, by what moved (in a task the shapes of things make it sharper):"]
+def skill_in_task(demonstration: Demonstration, path: str) -> Skill:
+    """Return the skill in the words of a task, which is made for it.
+
+    Args:
+        demonstration: the demonstration.
+        path: dotted path of a user's own task, or the name of a shipped one.
+
+    Raises:
+        UnknownName, BadConfig: no such task.
+        BadDemonstration: no skill is found, or none whose things the task has.
+    """
+    import gymnasium as gym
+
+    from ...baselines.programs.task_skills import skill_of
+    from ...configs import BadConfig
+    from ...envs.dotted_names import BadDottedName, is_dotted
+    from ..task_table import TASKS, environment_id
+
+    if not is_dotted(path) and path not in TASKS:
+        raise UnknownName("task", path, (*TASKS, "my_tasks:MY_TASK"))
+    try:
+        env: Any = gym.make(environment_id(path))
+    except BadDottedName as error:
+        raise BadConfig("--task", path, error.reason) from None
+    try:
+        return skill_of(demonstration, env.unwrapped.task)
+    finally:
+        env.close()
+
+
+def lines_of(skill: Skill, head: str = WITHOUT_SHAPES) -> list[str]:
+    """Return a skill in words, a line for each phase and what is known about it.
+
+    Args:
+        skill: the skill.
+        head: first line.
+    """
+    lines = [head]
     for line, below in described(skill):
         lines += [f"  {line}", *(f"    {text}" for text in below)]
     return [*lines, *(f"  {note}" for note in skill.notes)]

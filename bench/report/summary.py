@@ -11,7 +11,7 @@ from ...configs import RunConfig
 from ..atomic_files import write_whole
 from ..episodes.episode_records import EpisodeRecord
 from ..statistics import median, wilson
-from ..task_table import TASKS
+from ..task_table import facts_of
 from .groups import outcome_of
 
 SUMMARY = "summary.json"
@@ -28,9 +28,10 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
     """
     successes = sum(record.success for record in records)
     low, high = wilson(successes, len(records))
-    error = TASKS[config.task].error
+    error = facts_of(config.task).error
     successful = [record for record in records if record.success]
-    worst = [error.factor * max(record.numbers[error.key]) for record in successful] if error else []
+    errors = [each.numbers.get(error.key) for each in successful] if error else []
+    worst = [error.factor * max(found) for found in errors if found] if error else []
     timed = [record for record in records if max(record.tick_us) > 0.0]
     clearances = [1e3 * record.clearance for record in records if record.clearance is not None]
     return {

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...configs import BadConfig, load_grid, shipped_config
+from ...configs.grid import grid_of
 from ..console import console, counted
 from ..episodes.run_folder import LOG, alone, describe, merge, open_folder, parsed_shard, recorded
 from ..episodes.scenarios import read_suite
@@ -20,6 +21,7 @@ from .config_checks import check_grid
 from .contents_used import with_contents
 from .episode_jobs import EpisodeJobs
 from .finish import film, report, show
+from .own_task import is_own_task, own_config
 from .run_progress import RunProgress
 
 SHIPPED_FOLDERS = (".", os.path.join("configs", "bench"))
@@ -37,7 +39,7 @@ def run_config(
     """Run a config and write its run folder.
 
     Args:
-        config: config file, or the name of a shipped config.
+        config: config file, the name of a shipped config, or the dotted path of a task.
         overrides: `key=value` changes to the config.
         output: parent folder of the run folder.
         shard: part i of n of the episodes, as "i/n"; None: all episodes.
@@ -51,8 +53,11 @@ def run_config(
         BadConfig: the config, an override or the demonstration cannot be used.
         RunBusy: another process writes into the same folder.
     """
-    source, part = config_path(config), parsed_shard(shard)
-    grid = load_grid(source, overrides)
+    part = parsed_shard(shard)
+    if is_own_task(config):
+        grid = grid_of(own_config(config, overrides), config, overrides)
+    else:
+        grid = load_grid(config_path(config), overrides)
     check_grid(grid)
     grid = with_contents(with_actors(grid))
     folder = output / f"{grid.name}-{grid.digest()}"

@@ -12,15 +12,16 @@ from ...baselines.own_policy import is_own
 from ...configs import BadConfig, Grid, RunConfig
 from ...configs.errors import unknown_key
 from ...configs.run_config import FAMILIES
+from ...envs.dotted_names import BadDottedName, is_dotted
 from ...planner.errors import BadDemonstration, BadOption, UnknownName
 from ..recordings.robot_checks import robot_facts
-from ..task_table import TASKS
+from ..task_table import TASKS, environment_id, facts_of
 
 if TYPE_CHECKING:
     from ...planner import Demonstration
 
-OWN_KEYS = ("robot", "level", "obstacles", "render_mode")
-"""Environment arguments that are config keys of their own."""
+OWN_KEYS = ("robot", "level", "obstacles", "render_mode", "declared")
+"""Environment arguments that are config keys of their own, or the task itself."""
 
 
 def check_grid(grid: Grid) -> None:
@@ -65,7 +66,7 @@ def level_words() -> str:
 
 
 def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterable[str | None]]) -> None:
-    """Refuse an unknown name; dotted paths of users' own policies pass.
+    """Refuse an unknown name; dotted paths of users' own policies pass, those of tasks that can be imported, too.
 
     Args:
         source: file or place to blame in the message.
@@ -77,6 +78,12 @@ def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterab
         BadConfig: the name is unknown.
     """
     if key == "method" and isinstance(value, str) and is_own(value):
+        return
+    if key == "task" and is_dotted(value):
+        try:
+            environment_id(value)
+        except BadDottedName as error:
+            raise BadConfig(source, key, str(error)) from None
         return
     if key in known and value not in list(known[key]):
         words = level_words() if key == "level" else ", ".join(map(str, known[key]))
@@ -104,7 +111,7 @@ def check_env(cell: RunConfig, source: str | Path) -> None:
 
     if not cell.env:
         return
-    name = TASKS[cell.task].id
+    name = environment_id(cell.task)
     creator = load_env_creator(str(gym.spec(name).entry_point))
     known = [key for key in signature(creator).parameters if key not in OWN_KEYS]
     for key in cell.env:
@@ -171,7 +178,7 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
     if cell.task in PROGRAMS:
         _check_names(file, demonstration, cell)
     else:
-        _check_skill(demonstration)
+        _check_skill(cell.task, file, demonstration)
     if not is_shipped(file):  # those are compared by a test
         _check_robot(file, demonstration)
     return demonstration
@@ -181,7 +188,7 @@ def _check_names(file: Path, demonstration: Demonstration, cell: RunConfig) -> N
     """Refuse a demonstration of another task, or without the segments that the program of the task looks at."""
     from ...baselines.screw_policy import PROGRAMS
 
-    task, segments = TASKS[cell.task].demonstrated_task or cell.task, PROGRAMS[cell.task].SEGMENTS
+    task, segments = facts_of(cell.task).demonstrated_task or cell.task, PROGRAMS[cell.task].SEGMENTS
     if demonstration.task != task:
         raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
     names = [segment.name for segment in demonstration.segments]
@@ -208,11 +215,17 @@ def _check_content(file: Path, demonstration: Demonstration, program: Any) -> No
 
 
 @lru_cache(maxsize=32)
-def _check_skill(demonstration: Demonstration) -> None:
-    """Refuse a demonstration in which no skill is found; of each one this is looked at once."""
+def _check_skill(task: str, file: Path, demonstration: Demonstration) -> None:
+    """Refuse a demonstration without a skill, unless the task has one; of each one this is looked at once."""
     from ...baselines.programs.task_skills import skill_of
+    from ...envs import task_at
 
-    skill_of(demonstration)
+    if is_dotted(task) and task_at(task).skill is not None:
+        return
+    try:
+        skill_of(demonstration)
+    except BadDemonstration as error:
+        raise BadDemonstration(file, error.key, error.reason) from None
 
 
 @lru_cache(maxsize=32)

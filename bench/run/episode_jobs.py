@@ -33,7 +33,7 @@ from ..episodes.episode_records import EpisodeRecord, known_record
 from ..episodes.run_folder import FIGURE, VIDEO
 from ..episodes.scenarios import Scenario, ScenarioChanged, scenarios_of
 from ..method_table import WITHOUT_DEMONSTRATION
-from ..task_table import TASKS
+from ..task_table import environment_id, frequency_of, seconds_of
 from ..workers.dispatcher import ERROR, Answer, Job
 from ..workers.worker_process import main
 
@@ -112,13 +112,11 @@ def environment_key(config: RunConfig) -> str:
 
 def action_limit(config: RunConfig) -> int:
     """Return the time limit of an episode in actions."""
-    from ...envs import IDS
-
-    kind = IDS[TASKS[config.task].id]
-    seconds = kind.seconds if config.max_seconds is None else config.max_seconds
+    seconds, usual = seconds_of(config.task), frequency_of(config.task)
+    wanted = seconds if config.max_seconds is None else config.max_seconds
     # the environment refuses invalid frequencies
-    rate = config.env.get("control_frequency", kind.frequency)
-    return max(1, round(seconds * rate)) if isinstance(rate, int) else kind.steps
+    rate = config.env.get("control_frequency", usual)
+    return max(1, round(wanted * rate)) if isinstance(rate, int) else round(seconds * usual)
 
 
 def made(config: RunConfig, render_mode: str | None = None) -> Any:
@@ -136,7 +134,7 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env: Any = gym.make(
-            TASKS[config.task].id,
+            environment_id(config.task),
             robot=config.robot,
             level=config.level,
             obstacles=config.obstacles,

@@ -10,23 +10,28 @@ from pathlib import Path
 from typing import Any
 
 from ...configs import BadConfig, TrainConfig, load_training, shipped_training
+from ...configs.train_config import training_of
 from ...planner.errors import UnknownName
 from ..atomic_files import write_whole
 from ..console import console
 from ..episodes.run_folder import LOG, open_folder
 from ..interruption import ended
 from ..provenance import LEARNING, fingerprint
+from ..run.own_task import is_own_task, own_config
 from ..workers.dispatcher import HUNG, Dispatcher, Executor, Job, WorkerFailed
 from ..workers.executors import Serial, cores
 from .folder import CONFIG, SEED, curve_of, seeds_of, write_curves
 from .progress import progress, steps_done
+
+OWN = {"algorithm": "sac", "steps": 100_000}
+"""Values with which a user's own task is trained unless others are given."""
 
 
 def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool = False) -> int:
     """Train as a config says and write the training's folder.
 
     Args:
-        config: config file, or the name of a shipped training.
+        config: config file, the name of a shipped training, or the dotted path of a task.
         overrides: `key=value` changes to the config.
         output: parent folder of the training's folder.
         quiet: print only the folder and errors.
@@ -39,7 +44,10 @@ def run_training(config: str, overrides: list[str], output: Path, *, quiet: bool
         MissingExtra: torch or Stable-Baselines3 is not installed.
         RunBusy: another process writes into the same folder.
     """
-    chosen = load_training(_path(config), overrides)
+    if is_own_task(config):
+        chosen = training_of({**OWN, **own_config(config, overrides)}, config, overrides)
+    else:
+        chosen = load_training(_path(config), overrides)
     check(chosen)
     folder = output / f"{chosen.name}-{chosen.digest()}"
     err = console(stderr=True, quiet=quiet)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from ...configs import BadConfig, RunConfig, TrainConfig
+from ...envs.dotted_names import is_dotted
 from ..run.config_checks import check_env, check_name, fitting_demonstration, known_names
 
+OF_ONE_MOTION = ("sac-demo", "bc")
+"""Algorithms that need the demonstration as an episode of the task."""
 CHOSEN = ("reward", "goal_form", "end_on_success", "control_mode")
 """Environment arguments that the training's algorithm decides."""
 
@@ -23,6 +26,11 @@ def check_training(config: TrainConfig) -> None:
     known = {**known_names(), "task": sorted(EPISODES)}
     for key in ("task", "level", "robot"):
         check_name(config.name, key, getattr(config, key), known)
+    if is_dotted(config.task) and config.algorithm in OF_ONE_MOTION:
+        reason = (
+            f"{config.algorithm} learns from an episode of the demonstration, which only {', '.join(EPISODES)} have"
+        )
+        raise BadConfig(config.name, "algorithm", f"{reason}; for your own task: sac, ppo, sac-her, residual")
     cell = RunConfig(name=config.name, task=config.task, demonstration=config.demonstration, env=config.env)
     check_env(cell, config.name)
     for key in CHOSEN:

@@ -13,7 +13,7 @@ from ...baselines.learning.features import OBSTACLE
 from ...configs import TrainConfig, load_demonstration
 from ...envs.core.single_motion import LAST_ACTION
 from ...planner import Demonstration
-from ..task_table import TASKS
+from ..task_table import environment_id
 
 GOALS = ("achieved_goal", "desired_goal")
 MEASURED_EPISODES, MEASURED_STEPS = 20, 75
@@ -65,7 +65,7 @@ def base_env(config: TrainConfig, **options: Any) -> Any:
         arguments["control_mode"] = "joint_velocity"
     if config.algorithm == "sac-her":
         arguments |= {"goal_form": True, "reward": "sparse"}
-    return gym.make(TASKS[config.task].id, **{**arguments, **options})
+    return gym.make(environment_id(config.task), **{**arguments, **options})
 
 
 def seen_env(config: TrainConfig) -> Any:

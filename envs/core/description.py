@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...planner import Arm, Body, Obstacle, Pose, Shape
-from ..scene.scene_objects import Book, FreeBody, Furniture, Glass, extents
+from ..scene.scene_objects import CompoundBody, FreeThing, Furniture, extents
 
 FAILURES = (
     "ik_or_limit",
@@ -44,9 +45,11 @@ class TaskObject:
             object.__setattr__(self, "parts", (Obstacle(self.shape, name=self.name),))
 
     @staticmethod
-    def of(thing: FreeBody | Glass | Book) -> TaskObject:
+    def of(thing: FreeThing) -> TaskObject:
         """Describe a movable object of a scene."""
-        return TaskObject(thing.name, thing.shape, thing.yaw_symmetry)
+        solids = thing.parts if isinstance(thing, CompoundBody) else ()
+        parts = tuple(Obstacle(part.shape, part.pose, name=thing.name) for part in solids)
+        return TaskObject(thing.name, thing.shape, thing.yaw_symmetry, parts)
 
     @property
     def size(self) -> np.ndarray:
@@ -109,6 +112,7 @@ class TaskDescription:
         control_mode: meaning of an action; see the environment.
         scene_joints: joints of the scene that are not the robot's, like a door's hinge, in the order of
             `scene_joint_positions`.
+        skill: the demonstrated skill, if the task's author has written it; None: to be found in the demonstration.
     """
 
     name: str
@@ -125,3 +129,4 @@ class TaskDescription:
     obstacles: int = 0
     control_mode: str = "joint_velocity"
     scene_joints: tuple[str, ...] = ()
+    skill: Any = None

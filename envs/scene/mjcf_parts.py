@@ -9,9 +9,22 @@ import math
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
-from .scene_objects import Beads, Book, Color, FreeBody, Furniture, Glass, half_sizes
+from ...planner import Mesh
+from .scene_objects import (
+    Beads,
+    Book,
+    Color,
+    CompoundBody,
+    FixedShape,
+    FreeBody,
+    Furniture,
+    Glass,
+    SceneSpec,
+    half_sizes,
+)
 
-FRICTION = "1.0 0.005 0.0001"
+TURNING_FRICTION = "0.005 0.0001"
+FRICTION = f"1.0 {TURNING_FRICTION}"
 """Friction coefficients: sliding, torsional, rolling."""
 STAVES = 12
 """Number of boxes that form the wall of a glass."""
@@ -117,10 +130,48 @@ def bead_bodies(beads: Beads) -> list[Element]:
 def furniture_body(furniture: Furniture) -> Element:
     """Return furniture as a mocap body, which is moved between episodes."""
     body = Element("body", {"name": furniture.name, "mocap": "true"})
-    for part in furniture.parts:
-        kind, size = half_sizes(part.shape)
-        _geom(body, kind, size, part.color, pos=_text(part.place[:3]), quat=_text(part.place[3:]))
+    _add_parts(body, furniture, {})
     return body
+
+
+def compound_body(compound: CompoundBody) -> Element:
+    """Return a free body of several parts, which does not twist easily in the grasp."""
+    body = _free(compound.name)
+    _add_parts(body, compound, {"density": f"{compound.density}", "condim": "4"})
+    return body
+
+
+def mesh_assets(spec: SceneSpec) -> list[Element]:
+    """Return the meshes of which compound bodies and furniture consist."""
+    wholes = [each for each in (*spec.objects, *spec.furniture) if isinstance(each, CompoundBody | Furniture)]
+    return [
+        Element("mesh", {"name": _mesh_name(whole, k), "vertex": _text(part.shape.vertices.ravel())})
+        for whole in wholes
+        for k, part in enumerate(whole.parts)
+        if isinstance(part.shape, Mesh)
+    ]
+
+
+def _mesh_name(whole: CompoundBody | Furniture, index: int) -> str:
+    return f"{whole.name}_part{index}"
+
+
+def _add_parts(body: Element, whole: CompoundBody | Furniture, more: dict[str, str]) -> None:
+    """Add all parts to the body of the whole, each with its visual twin."""
+    for k, part in enumerate(whole.parts):
+        place = {"pos": _text(part.place[:3]), "quat": _text(part.place[3:])}
+        solid = {**place, **more, "friction": f"{whole.friction:.9g} {TURNING_FRICTION}"}
+        if isinstance(part.shape, Mesh):
+            _mesh_geom(body, _mesh_name(whole, k), part, solid, place)
+        else:
+            _geom(body, *half_sizes(part.shape), part.color, **solid)
+
+
+def _mesh_geom(body: Element, mesh: str, part: FixedShape, solid: dict[str, str], place: dict[str, str]) -> None:
+    shared = {"type": "mesh", "mesh": mesh}
+    SubElement(body, "geom", {**shared, **solid, "group": "0", "rgba": "0 0 0 0"})
+    unfelt = {"group": "1", "contype": "0", "conaffinity": "0", "mass": "0"}
+    SubElement(body, "geom", {**shared, **place, **unfelt, "rgba": _text(part.color)})
 
 
 def obstacle_bodies(count: int) -> list[Element]:

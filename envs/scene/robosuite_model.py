@@ -20,8 +20,17 @@ from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
 from robosuite.utils.mjcf_utils import CustomMaterial
 
 from .baxter_trunk import slice_trunk
-from .mjcf_parts import bead_bodies, book_body, furniture_body, glass_body, obstacle_bodies, solid_body
-from .scene_objects import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, FreeBody, Glass, SceneSpec, half_sizes
+from .mjcf_parts import (
+    bead_bodies,
+    book_body,
+    compound_body,
+    furniture_body,
+    glass_body,
+    mesh_assets,
+    obstacle_bodies,
+    solid_body,
+)
+from .scene_objects import TABLE_HALF_SIZE, TABLE_HEIGHT, Book, CompoundBody, FreeBody, Glass, SceneSpec, half_sizes
 from .servos import leave_out_unused, mend_robot, use_velocity_servos
 
 TABLE_COLOR = "0.78 0.74 0.68 1"
@@ -59,6 +68,7 @@ class OneDemoTableScene(ManipulationEnv):
         wooden = [_wooden(each) for each in self.spec.objects if isinstance(each, FreeBody) and each.texture]
         self.model = ManipulationTask(arena, [robot_model], wooden)
         self.model.worldbody.extend(_other_bodies(self.spec))
+        self.model.asset.extend(mesh_assets(self.spec))
         slice_trunk(self.model.root)
         mend_robot(self.model.root)
         use_velocity_servos(self.model.root, set(robot_model.joints))
@@ -74,6 +84,7 @@ def _other_bodies(spec: SceneSpec) -> list[Element]:
     free = [glass_body(each) for each in spec.objects if isinstance(each, Glass)]
     free += [solid_body(each) for each in spec.objects if isinstance(each, FreeBody) and not each.texture]
     free += [book_body(each) for each in spec.objects if isinstance(each, Book)]
+    free += [compound_body(each) for each in spec.objects if isinstance(each, CompoundBody)]
     free += [furniture_body(each) for each in spec.furniture]
     beads = bead_bodies(spec.beads) if spec.beads else []
     return [*free, *beads, *obstacle_bodies(spec.obstacles)]

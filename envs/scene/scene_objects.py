@@ -112,11 +112,11 @@ class Beads:
 
 @dataclass(frozen=True)
 class FixedShape:
-    """A solid part of furniture.
+    """A solid part of furniture or of a compound body.
 
     Attributes:
-        shape: box, sphere, capsule or cylinder.
-        place: (7,) pose of the shape's center in the furniture's frame, x y z [m] and wxyz.
+        shape: any shape; a mesh has its own frame, the others are centered on theirs.
+        place: (7,) pose of the shape's frame in that of the whole, x y z [m] and wxyz.
         color: color of the part.
     """
 
@@ -131,16 +131,43 @@ class FixedShape:
 
 
 @dataclass(frozen=True)
+class CompoundBody:
+    """A free body of several solid parts.
+
+    Attributes:
+        name: unique name.
+        parts: solid parts.
+        shape: convex hull of all parts, in the body's frame.
+        density: density [kg/m3].
+        friction: sliding friction coefficient.
+        yaw_symmetry: see `FreeBody`.
+    """
+
+    name: str
+    parts: tuple[FixedShape, ...]
+    shape: Shape
+    density: float = 600.0
+    friction: float = 1.0
+    yaw_symmetry: float = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
 class Furniture:
     """Furniture: fixed within an episode, possibly moved between episodes.
 
     Attributes:
         name: unique name.
         parts: solid parts.
+        friction: sliding friction coefficient.
     """
 
     name: str
     parts: tuple[FixedShape, ...]
+    friction: float = 1.0
+
+
+FreeThing = FreeBody | Glass | Book | CompoundBody
+"""Any free body of a scene."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +181,7 @@ class SceneSpec:
         obstacles: largest number of obstacles, of any shape, at once.
     """
 
-    objects: tuple[FreeBody | Glass | Book, ...] = ()
+    objects: tuple[FreeThing, ...] = ()
     furniture: tuple[Furniture, ...] = ()
     beads: Beads | None = None
     obstacles: int = 0

@@ -21,7 +21,7 @@ class PhaseCorrection:
         grasp: sample of the demonstration at which the hand holds the thing as it should.
         path: whether a push follows the "measured" or the "commanded" path.
         gripper: action at the end.
-        skip: True: the phase is left out; of reaching and carrying one thing, both are.
+        skip: True: it is left out, with all that is done with the thing, from reaching it on.
     """
 
     reference: str | None = None

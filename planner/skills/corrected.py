@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ..errors import BadDemonstration, UnknownName
@@ -17,9 +17,9 @@ APPLIES: dict[str, tuple[Kind, ...]] = {
     "goal": ("carry",),
     "turns": ("reach", "carry"),
     "grasp": ("reach",),
-    "path": ("articulate",),
-    "gripper": ("reach", "carry", "articulate"),
-    "skip": ("reach", "carry", "articulate", "withdraw"),
+    "path": ("articulate", "slide"),
+    "gripper": ("reach", "carry", "slide", "articulate"),
+    "skip": ("reach", "carry", "slide", "articulate", "withdraw"),
 }
 """Kinds of phases of which each correction can be said."""
 
@@ -98,11 +98,20 @@ def corrected(phases: list[Phase], demonstration: Demonstration) -> list[Phase]:
     said = demonstration.corrections
     _check(demonstration, {phase.name: phase for phase in phases})
     skipped: set[str] = set()
-    for phase, following in zip(phases, [*phases[1:], None], strict=True):
-        pair = (phase, following) if phase.kind == "reach" and following is not None else (phase,)
-        if any(said.of(each.name).skip for each in pair):
-            skipped |= {each.name for each in pair}
+    for together in _together(phases):
+        if any(said.of(each.name).skip for each in together):
+            skipped |= {each.name for each in together}
     return [_changed(phase, said.of(phase.name)) for phase in phases if phase.name not in skipped]
+
+
+def _together(phases: Sequence[Phase]) -> list[list[Phase]]:
+    """Return what is done with one thing: reaching it, and all that follows until another one is reached."""
+    found: list[list[Phase]] = []
+    for phase in phases:
+        if phase.kind in ("reach", "withdraw") or not found:
+            found.append([])
+        found[-1].append(phase)
+    return found
 
 
 def _changed(phase: Phase, said: PhaseCorrection) -> Phase:

@@ -20,6 +20,7 @@ from .corrected import corrected, regrasped, said_path, said_reference
 from .grips import BRIEF, Closing, Grip, grips
 from .references import Reference, reference_of
 from .skill import START, Choice, Phase, Skill
+from .slides import slide_of, slides_from
 from .thing import Thing
 
 TRIM = 0.02
@@ -137,7 +138,10 @@ def _fetch_and_carry(
         evidence=(f"{grip.name} moves with the hand from {_at(demonstration, grip.held)} on",),
     )
     carry, choices = _carry(demonstration, scene, grip, number)
-    return [reach, carry], choices
+    begins = slides_from(demonstration, grip, carry)
+    if begins is None:
+        return [reach, carry], choices
+    return [reach, *slide_of(demonstration, grip, carry, begins, TRIM)], choices
 
 
 def _same_sign(dq: np.ndarray, pose: Pose) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from ..geometry.pose import Pose, PosePath
 
-Kind = Literal["reach", "carry", "articulate", "withdraw"]
+Kind = Literal["reach", "carry", "slide", "articulate", "withdraw"]
 START = ""
 """Reference of an end that is relative to where the moving body was at the beginning."""
 SAME = (Pose.identity(),)
@@ -15,15 +15,15 @@ SAME = (Pose.identity(),)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Phase:
-    """One motion: the hand goes to a thing, carries it, moves it on its hinge, or withdraws.
+    """One motion: the hand goes to a thing, carries it, slides it along another, moves it on its hinge, or withdraws.
 
-    The moving body is the thing in the hand in "carry", else the hand. It may end at `reference` @ left @ goal @ right
-    for every goal and every pair of turns: all of them look alike.
+    The moving body is the thing in the hand in "carry" and "slide", else the hand. It may end at `reference` @ left @
+    goal @ right for every goal and every pair of turns: all of them look alike.
 
     Attributes:
         name: unique in the skill.
         kind: what is done.
-        thing: the thing that is reached, carried or moved on its hinge; "" for "withdraw".
+        thing: the thing that is reached, carried, slid or moved on its hinge; "" for "withdraw".
         reference: the thing that the end is relative to; `START`: where the body was at the beginning.
         path: n poses of the moving body in the world of the demonstration.
         goals: `reference_from_body` at the end, the likeliest first.

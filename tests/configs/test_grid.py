@@ -207,7 +207,7 @@ BAD = {
     "half a worker": (BASE + "workers: 1.5\n", "workers: .*integer"),
     "no time": (BASE + "wall_seconds: 0\n", "wall_seconds: .*greater than 0"),
     "address of nothing": (BASE + "address: ray://x\n", "address: is only for executor: ray, which is 'process'"),
-    "far key": (BASE + "colour: red\n", "colour: unknown key; allowed: name, task, .*settings, contents, sweep, defaults"),
+    "far key": (BASE + "colour: red\n", "colour: unknown key; allowed: name, task, .*contents, sweep, defaults"),
 }
 
 

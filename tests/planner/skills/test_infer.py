@@ -147,3 +147,25 @@ def test_the_skill_does_not_depend_on_the_frame_of_the_world(yaw, x, y, z):
         assert (one.name, one.reference, one.touching) == (other.name, other.reference, other.touching)
         assert all(is_near(a, b) for a, b in zip(one.goals, other.goals, strict=True))
         assert len(one.left) == len(other.left) and len(one.right) == len(other.right)
+
+
+@pytest.mark.parametrize("way, pressed, slides", [(0.12, 0.0015, True), (0.03, 0.0, False)])
+def test_what_slides_on_its_support_is_put_down_where_that_begins_and_then_follows_what_was_commanded(
+    way, pressed, slides
+):
+    cube, board = at(0.4, 0.1, 0.02), at(0.5, -0.1, 0.005)
+    grasp, raised = hand(0.4, 0.1, 0.02), hand(0.4, 0.1, 0.15)
+    begins, ends = (hand(0.5, -0.1 + y, 0.03) for y in (-0.5 * way, 0.5 * way))
+    over = Pose.from_position_quaternion([0, 0, 0.1]) @ begins
+    moves = [Move(grasp, 40, 1.0), Move(raised, 20, 1.0, 0), Move(over, 30, 1.0, 0), Move(begins, 20, 1.0, 0)]
+    moves += [Move(ends, 30, -1.0), Move(Pose.from_position_quaternion([0, 0, 0.1]) @ ends, 20)]
+    held = dict.fromkeys(range(1, 5), "cube")
+    shown = demonstrated(hand(0.3, -0.1, 0.3), moves, {"cube": cube}, held=held, fixtures={"board": board})
+    shown = replace(shown, commanded=shown.path.moved(Pose.from_position_quaternion([0, 0, -pressed])))
+    phases = infer_skill(shown, {"cube": CUBE, "board": box("board", 0.2, 0.3, 0.01, free=False)}).phases
+    assert [phase.kind for phase in phases] == ["reach", "carry", *(["slide"] if slides else []), "withdraw"]
+    carry, last = phases[1], phases[-2]
+    if slides:
+        assert carry.gripper == "none" and last.gripper == "open" and last.exact
+        assert abs((board @ carry.goals[0]).position[1] - (-0.1 - 0.5 * way)) < 0.01
+        assert is_near(board @ last.goals[0], at(0.5, -0.1 + 0.5 * way, 0.03 - pressed), 1e-4, 1e-3)

@@ -1,0 +1,58 @@
+"""Objects in users' own modules, by a dotted path `my_package.my_module:name`."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ..planner.errors import OneDemoError
+
+
+class BadDottedName(OneDemoError, ValueError):
+    """A dotted path names nothing that can be imported."""
+
+    def __init__(self, path: str, reason: str):
+        self.path, self.reason = path, reason
+        super().__init__(f"{path}: {reason}")
+
+
+def is_dotted(name: object) -> bool:
+    """Return whether a name is a dotted path, not the name of something shipped."""
+    return isinstance(name, str) and ":" in name
+
+
+def imported(path: str, form: str) -> Any:
+    """Import the object that a dotted path names; importing its module runs its code.
+
+    The module is searched on Python's path and in the current folder.
+
+    Args:
+        path: dotted path.
+        form: how such a path looks, for the message.
+
+    Raises:
+        BadDottedName: no such module or name.
+    """
+    module, _, attribute = path.partition(":")
+    if not module or not attribute.isidentifier() or not all(part.isidentifier() for part in module.split(".")):
+        raise BadDottedName(path, f"is not of the form {form}")
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        found = import_module(module)
+    except Exception as error:
+        raise BadDottedName(path, f"importing {module}: {said(error)}") from error
+    finally:
+        sys.path.remove(here)
+    if not hasattr(found, attribute):
+        known = ", ".join(key for key in vars(found) if not key.startswith("_")) or "nothing"
+        raise BadDottedName(path, f"{module} has no {attribute!r}; it has: {known}")
+    return getattr(found, attribute)
+
+
+def said(error: Exception) -> str:
+    """Return an error as one line."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
