@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..geometry import dualquat as dq
 from ..geometry.pose import Pose, PosePath
 from ..imitation.demonstration import Demonstration
 
@@ -107,7 +108,7 @@ def _grip(demonstration: Demonstration, name: str, path: PosePath, closing: Clos
     if held is None:
         return None
     released = _last_held(relative, held, closing.stop, stop)
-    here = relative[held]
+    here = Pose(relative[held])
     return Grip(
         name=name,
         closed=closing.start,
@@ -121,45 +122,46 @@ def _grip(demonstration: Demonstration, name: str, path: PosePath, closing: Clos
     )
 
 
-def hand_from(hand: PosePath, path: PosePath) -> list[Pose]:
-    """Return the poses of an object in the hand.
+def hand_from(hand: PosePath, path: PosePath) -> np.ndarray:
+    """Return the poses (n, 8) of an object in the hand, as dual quaternions.
 
     Args:
         hand: n poses of the tcp.
         path: n poses of the object.
     """
-    return [tcp.inverse() @ pose for tcp, pose in zip(hand, path, strict=True)]
+    return dq.mul(dq.conj(hand.dqs), path.dqs)
 
 
-def _first_held(relative: list[Pose], path: PosePath, start: int, stop: int, window: int) -> int | None:
+def _first_held(relative: np.ndarray, path: PosePath, start: int, stop: int, window: int) -> int | None:
     """Return the first sample in which an object moves along with the hand that carries it; None if there is none."""
-    for i in range(start, stop):
-        gap, angle = relative[i].distance_to(relative[min(i + window, stop)])
-        if gap > RIGID or angle > TURN:
-            continue
-        ways = np.linalg.norm(path.positions[i : _lost(relative, i, stop) + 1] - path.positions[i], axis=1)
+    samples = np.arange(start, stop)
+    gaps, angles = dq.pose_distance(relative[samples], relative[np.minimum(samples + window, stop)])
+    for i in samples[(gaps <= RIGID) & (angles <= TURN)]:
+        ways = np.linalg.norm(path.positions[i : _lost(relative, int(i), stop) + 1] - path.positions[i], axis=1)
         if ways.max() > CARRIED:
-            return i + int(np.argmax(ways > RIGID)) - 1
+            return int(i) + int(np.argmax(ways > RIGID)) - 1
     return None
 
 
-def _lost(relative: list[Pose], held: int, stop: int) -> int:
+def _lost(relative: np.ndarray, held: int, stop: int) -> int:
     """Return the last sample in which an object is in the hand about as it was held; it may drift there."""
-    for i in range(held + 1, stop + 1):
-        gap, angle = relative[i].distance_to(relative[held])
-        if gap > SLIPPED or angle > ROLLED:
-            return i - 1
-    return stop
+    return _near(relative, held, held, stop, SLIPPED, ROLLED)
 
 
-def _last_held(relative: list[Pose], held: int, opening: int, stop: int) -> int:
+def _last_held(relative: np.ndarray, held: int, opening: int, stop: int) -> int:
     """Return the last sample before an object left the hand: when the fingers opened, or earlier if it was lost."""
     last = _lost(relative, held, stop)
-    for i in range(opening + 1, last + 1):
-        gap, angle = relative[i].distance_to(relative[opening])
-        if gap > RIGID or angle > TURN:
-            return i - 1
-    return min(last, opening)
+    parts = _near(relative, opening, opening, last, RIGID, TURN)
+    return parts if parts < last else min(last, opening)
+
+
+def _near(relative: np.ndarray, place: int, start: int, stop: int, gap: float, angle: float) -> int:
+    """Return the last sample after a start up to which an object stays within a gap [m] and angle [rad] of a place."""
+    if stop <= start:
+        return stop
+    gaps, angles = dq.pose_distance(relative[place], relative[start + 1 : stop + 1])
+    away = np.flatnonzero((gaps > gap) | (angles > angle))
+    return start + int(away[0]) if len(away) else stop
 
 
 def _undisturbed(hand: PosePath, path: PosePath, start: int, held: Pose) -> Pose:
