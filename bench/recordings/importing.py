@@ -15,7 +15,7 @@ from ...planner import Arm, Demonstration, Pose
 from ...planner.errors import BadDemonstration
 from ...planner.recordings.cuts import LEAVING, SegmentRequest
 from ...planner.recordings.import_recording import demonstration_of
-from ...planner.recordings.kinematic_check import gaps_in_words, reach_in_words
+from ...planner.recordings.kinematic_check import check_object, gaps_in_words, reach_in_words
 from ...planner.recordings.pose_columns import TableRequest
 from ...planner.recordings.pose_table import recording_from_table
 from ...planner.recordings.recording import Recording, blame_of
@@ -81,6 +81,7 @@ def imported(raw: Path, request: ImportRequest) -> tuple[Demonstration, tuple[st
     notes = [note for note in (about_robot(request.robot), *recording.notes) if note]
     if recording.is_computed or raw.suffix.lower() in ENDINGS:  # tables with poses were looked at with their units
         notes.append(reach_in_words(recording.hand, recording.time, arm, "m", blame_of(raw, "poses")))
+        _check_objects(recording)
     if recording.joints is not None and arm is not None:
         _check_dof(raw, arm, recording.joints)
         poses = None if recording.is_computed else recording.hand
@@ -112,6 +113,15 @@ def imported(raw: Path, request: ImportRequest) -> tuple[Demonstration, tuple[st
         demonstration, about_glasses = _with_glasses(demonstration)
         notes += about_glasses
     return demonstration, (*notes, *about_task, *_left_over(demonstration, recording))
+
+
+def _check_objects(recording: Recording) -> None:
+    """Refuse objects of a teleoperation or an episode that are none."""
+    is_npz = recording.file.suffix.lower() not in ENDINGS
+    for name, path in recording.objects.items():
+        way_out = f"leave it out with --ignore 'obj_{name}*'" if is_npz else "cut the episode, or take another one"
+        blame, at = blame_of(recording.file, f"obj_{name}" if is_npz else name), (recording.hand, recording.time)
+        check_object(name, path, *at, recording.gripper, blame, way_out)
 
 
 def _recording(raw: Path, request: ImportRequest, arm: Arm | None) -> Recording:

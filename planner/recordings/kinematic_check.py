@@ -143,7 +143,13 @@ def gaps_in_words(path: PosePath, time: np.ndarray) -> list[str]:
 
 
 def check_object(
-    name: str, path: PosePath, hand: PosePath, time: np.ndarray, gripper: np.ndarray | None, blame: Blame
+    name: str,
+    path: PosePath,
+    hand: PosePath,
+    time: np.ndarray,
+    gripper: np.ndarray | None,
+    blame: Blame,
+    way_out: str = "leave it out",
 ) -> None:
     """Refuse a path of no object: it jumps, or is another pose of the same hand.
 
@@ -154,6 +160,7 @@ def check_object(
         time: (n,) [s].
         gripper: (n,) command; None if not recorded.
         blame: makes an error from a reason.
+        way_out: what its user can do.
 
     Raises:
         BadDemonstration: one line says why.
@@ -163,7 +170,7 @@ def check_object(
     if len(jumps):
         k = int(jumps[0])
         reason = f"object {name!r} jumps by {steps[k]:.3g} m from sample {k} to {k + 1}, in {spans[k]:.3g} s"
-        raise blame(f"{reason}: was it lost there? leave it out with --ignore '{name}_*'")
+        raise blame(f"{reason}: was it lost there? {way_out}")
     free = np.ones(len(time), dtype=bool) if gripper is None else np.asarray(gripper) < 0.0
     is_free = gripper is not None and float(steps_of(hand)[free[1:]].sum()) > MOVED
     looked = free if is_free else np.ones(len(time), dtype=bool)
@@ -175,7 +182,7 @@ def check_object(
         why = f"is within {1e3 * NEAR:.0f} mm of the hand" if is_near else "moves as if fixed to the hand"
         when = "while the gripper is open, too" if is_free else "all the time"
         reason = f"object {name!r} {why} {when}: a command, or another frame of the arm?"
-        raise blame(f"{reason} leave it out with --ignore '{name}_*'")
+        raise blame(f"{reason} {way_out}")
 
 
 def steps_of(path: PosePath) -> np.ndarray:

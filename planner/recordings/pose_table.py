@@ -50,7 +50,8 @@ def recording_from_table(path: str | Path, request: TableRequest, arm: Arm | Non
     }
     _check_gripper(table, roles, request, gripper, hand, objects)
     for name, path_ in objects.items():
-        check_object(name, path_, hand, time, gripper, blame_of(table.path, "table"))
+        ignored = f"leave it out with --ignore '{name}_*'"
+        check_object(name, path_, hand, time, gripper, blame_of(table.path, "table"), ignored)
     notes = (*table.notes, about_hand, about_time, about_joints, about_gripper, *roles.notes)
     if objects:
         notes = (*notes, f"objects: {', '.join(objects)}")
