@@ -14,7 +14,7 @@ from ..core.description import TaskFurniture, TaskObject
 from ..core.environment import SLOTS
 from ..mujoco_library import decimal_points, mujoco
 from ..scene.robots import ROBOTS, robot_named, robot_with_gripper
-from ..scene.scene import ARM, FIRST_OBJECT, FURNITURE, OTHER_ARM, CompiledScene, robosuite_library, scene_of
+from ..scene.scene import ARM, FIRST_OBJECT, FURNITURE, KEPT, OTHER_ARM, CompiledScene, robosuite_library, scene_of
 from ..scene.scene_objects import TABLE_HALF_SIZE, TABLE_HEIGHT, SceneSpec
 from .judge import RobosuiteJudge
 from .solids import body_solids, hull_of, solid_geoms
@@ -109,7 +109,7 @@ def _scene_alone(task: str, robot: str, gripper: str) -> CompiledScene:
     return guest_scene(task, robot, gripper).scene
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=KEPT)
 def _compiled(task: str, robot: str, gripper: str) -> GuestScene:
     with robosuite_library():
         from . import robosuite_task

@@ -24,6 +24,8 @@ from .scene_objects import NOTHING, SceneSpec
 WORLD, ARM, FINGERS, OTHER_ARM, OTHER_FINGERS, OBSTACLE, FURNITURE, BEAD, FIRST_OBJECT = range(9)
 """Owners of geoms: the fixed world, the first arm, its fingers, the second arm, its fingers, an obstacle, furniture,
 a bead, or object k as FIRST_OBJECT + k."""
+KEPT = 8
+"""Number of compiled scenes that a process keeps: each is one second's work, and up to 250 MB."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def compiled_scene(robot: Robot, spec: SceneSpec = NOTHING, arms: tuple[str, ...
     return _compiled(robot, spec, robot.checked_arms(arms))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=KEPT)
 def _compiled(robot: Robot, spec: SceneSpec, working: tuple[str, ...]) -> CompiledScene:
     with robosuite_library():
         from . import robosuite_model as library
