@@ -30,7 +30,7 @@ def console(*, stderr: bool = False, quiet: bool = False) -> Console:
     """
     from rich.console import Console
 
-    return Console(stderr=stderr, quiet=quiet, highlight=False, markup=False, soft_wrap=True)
+    return Console(stderr=stderr, quiet=quiet, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def counted(count: int, noun: str) -> str:

@@ -36,6 +36,8 @@ def imported(path: str, form: str) -> Any:
         BadDottedName: no such module or name.
     """
     module, _, attribute = path.partition(":")
+    if module.endswith(".py"):
+        raise BadDottedName(path, f"names a file: leave .py out, {module.removesuffix('.py')}:{attribute}")
     if not module or not attribute.isidentifier() or not all(part.isidentifier() for part in module.split(".")):
         raise BadDottedName(path, f"is not of the form {form}")
     here = str(Path.cwd())

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ...envs import Task, task_at
-from ...envs.dotted_names import is_dotted
+from ...envs.dotted_names import is_dotted, said
 from ...planner import Demonstration
-from ...planner.errors import UnknownName
+from ...planner.errors import OneDemoError, UnknownName
 from .record_pour import record_pour
 from .record_shelve import SCENE, record_shelve
-from .scripted_recorder import recorded
+from .scripted_recorder import ScriptedMotion, recorded
 
 
 class Recorder(NamedTuple):
@@ -55,5 +57,30 @@ def recorder_of(task: str) -> Recorder:
 def _recorded(env: Any, task: Task) -> Demonstration:
     """Record a user's own script at the nominal layout."""
     observation, _ = env.reset(seed=0, options={"level": "L0"})
+    motions = _motions(task, observation, [each.name for each in env.task.furniture])
+    return recorded(env, observation, motions, name=task.name)
+
+
+def _motions(task: Task, observation: dict[str, np.ndarray], fixed: Sequence[str]) -> Iterator[ScriptedMotion]:
+    """Yield the motions of a user's script; what is wrong with them is said in one line.
+
+    Raises:
+        BadTask: the script raises an error, or yields what is no motion among the task's things.
+    """
     assert task.script is not None
-    return recorded(env, observation, task.script(observation), name=task.name)
+    known = [*(each.name for each in task.objects), *fixed]
+    try:
+        for motion in task.script(observation):
+            if not isinstance(motion, ScriptedMotion):
+                raise task.bad("script", f"yields {type(motion).__name__}; expected ScriptedMotion(name, waypoints, …)")
+            for key, name in (("reference", motion.reference), ("held", motion.held)):
+                if name and name not in known:
+                    raise task.bad(
+                        "script", f"{key} of {motion.name!r}: {name!r} is not there; there are {', '.join(known)}"
+                    )
+            yield motion
+    except OneDemoError:
+        raise
+    except Exception as error:
+        keys = f"; the observation has {', '.join(observation)}" if isinstance(error, KeyError) else ""
+        raise task.bad("script", f"{said(error)}{keys}") from error

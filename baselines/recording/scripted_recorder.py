@@ -112,8 +112,14 @@ class _Recorder:
         """Execute a motion and return its segment."""
         start, names = max(self._free, len(self.joints) - 1), [each.name for each in self.env.task.objects]
         fixed = [each.name for each in self.env.task.furniture]
-        for waypoint in motion.waypoints:
-            self.go(waypoint)
+        for number, waypoint in enumerate(motion.waypoints):
+            try:
+                self.go(waypoint)
+            except PlanFailed as failed:
+                down = -waypoint.tcp.rotation[2, 2]
+                turned = "; there the tool points up: quaternions are wxyz, 0 1 0 0 points down" if down < 0.0 else ""
+                where = f"waypoint {number} of {motion.name!r}: {failed.detail}{turned}"
+                raise PlanFailed(failed.reason, where) from None
         self.wait(CATCH_UP)
         reference = Pose.identity()
         if motion.reference in fixed:
@@ -157,7 +163,9 @@ def recorded(
     recorder.wait(JUDGED)
     if not recorder.succeeded:
         info = recorder.info
-        raise BadDemonstration(name, "script", f"no success: {info['stage']}, {info['failure_reason'] or 'unfinished'}")
+        last = f"at the end the hand is {'closed' if recorder.gripper > 0 else 'open'}{_still_missing(info)}"
+        reason = f"no success: {info['stage']}, {info['failure_reason'] or 'unfinished'}; {last}"
+        raise BadDemonstration(name, "script", reason)
     joints, arm, task = np.array(recorder.joints), recorder.arm, env.task
     paths = np.swapaxes(np.array(recorder.objects), 0, 1)
     return Demonstration(
@@ -176,6 +184,16 @@ def recorded(
         object_paths={each.name: PosePath.from_vectors(rows) for each, rows in zip(task.objects, paths, strict=True)},
         fixtures=recorder.fixtures() if task.furniture else {},
         commanded=PosePath(np.array([arm.fk(q).dq for q in recorder.sent])),
+    )
+
+
+def _still_missing(info: dict[str, Any]) -> str:
+    """Return how far objects are from their goals, in words; "" if the task does not say."""
+    errors = np.atleast_1d(info.get("position_error", ()))
+    return (
+        f", objects are {', '.join(f'{1e3 * error:.1f}' for error in errors)} mm from their goals"
+        if len(errors)
+        else ""
     )
 
 

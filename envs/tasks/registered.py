@@ -70,7 +70,7 @@ def demonstration_of(path: str) -> str:
     """Return the file of the demonstration of the task that a dotted path names, relative to the current folder.
 
     Raises:
-        BadTask: the task names no demonstration.
+        BadTask: the task names no demonstration, or one that is not there.
     """
     task = task_at(path)
     if not str(task.demonstration):
@@ -79,6 +79,9 @@ def demonstration_of(path: str) -> str:
     file = Path(task.demonstration)
     beside = Path(_file_of(path)).parent / file
     found = beside if beside.exists() or not file.exists() else file
+    if not found.exists():
+        reason = f"{found.name} does not exist: record it with 'onedemo demo record {path} -o {file}', or import one"
+        raise task.bad("demonstration", reason)
     here = Path.cwd()
     return str(found.resolve().relative_to(here) if found.resolve().is_relative_to(here) else found)
 

@@ -86,13 +86,13 @@ class TaskProgress(Progress):
         also = self._task.success.also
         done = verdict.placed == len(self._goals) and verdict.quiet == 1
         # asked at every state: it may remember what it has seen
-        agreed = also is None or bool(self._asked("also", also))
+        agreed = also is None or self._holds("also", also)
         self._settle(done and agreed, verdict)
         self._note_stage(state)
         if verdict.fallen:
             self._fail("off_table")
         for reason, predicate in self._task.success.failed:
-            if self._asked(reason, predicate):
+            if self._holds(reason, predicate):
                 self._fail(reason)
         return verdict
 
@@ -104,6 +104,13 @@ class TaskProgress(Progress):
             raise self._task.bad(f"success: {key}", str(error)) from None
         except Exception as error:
             raise self._task.bad(f"success: {key}", said(error)) from error
+
+    def _holds(self, key: str, predicate: Callable[[SceneView], bool]) -> bool:
+        """Return whether a condition of the task's own holds; one that says neither is an error."""
+        found = self._asked(key, predicate)
+        if not isinstance(found, bool | np.bool_):
+            raise self._task.bad(f"success: {key}", f"returns {found!r}; expected True or False: is a return missing?")
+        return bool(found)
 
     def _fail(self, reason: str) -> None:
         self._failure, self._over = self._failure or reason, True

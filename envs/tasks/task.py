@@ -165,6 +165,8 @@ class Task:
         if not usable or not np.isfinite(numbers).all():
             form = "Range((x, y), shift=(L1, L2), turn=(L1, L2)) in meters and radians"
             raise self.bad(key, f"of {name!r} is {where!r}; expected {form}")
+        if max(abs(turn) for _, turn in reaches) > math.pi:
+            raise self.bad(key, f"{name!r} turns by {where.turn}: more than half a turn; in radians, np.deg2rad(…)?")
         for place in places:
             if np.abs(place).max() > TABLE_EDGE:
                 at = f"({place[0]:g}, {place[1]:g})"
