@@ -128,7 +128,7 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["report", "a", "b"], "command line: --output: is needed where several runs are compared"),
         (["report"], "Missing argument 'RUN'; usage: onedemo report [OPTIONS]"),
         (["fly"], "No such command 'fly'; onedemo knows: run, train, curves, report, plan, reproduce, "),
-        (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, import"),
+        (["demo", "fly"], "No such command 'fly'; onedemo demo knows: check, skill, import"),
         (["--fast"], "No such option: --fast"),
         (["run"], "Missing argument 'config'; usage: onedemo run [OPTIONS]"),
         (
