@@ -24,7 +24,7 @@ ARM, BODY, _ = panda()
 
 @for_all(st.integers(0, 10**6), max_examples=60)
 def test_the_excess_of_a_contact_is_that_of_many_samples(seed):
-    """Samples by the planner's own queries: the judge bounds what they find, and hardly more."""
+    """Samples by the planner's own queries: the judge bounds what they find, and refuses hardly more."""
     rng = np.random.default_rng(seed)
     arm = random_arm(seed, 4)
     frames = np.arange(4.0)
@@ -40,14 +40,16 @@ def test_the_excess_of_a_contact_is_that_of_many_samples(seed):
         margin = 0.01 if obstacle.margin is None else obstacle.margin
         mine = [name in [one for one, other in allowed if other == obstacle.name] for name in body.names]
         if any(mine):
-            part = Body(rows[mine], tuple(np.array(body.names)[mine]))
-            g = robot_arrays((arm,), (part,), pack([obstacles[k]]), margin=0.01)
-            # the judge counts at most the radius of a capsule as depth
-            deepest = -max(row[-1] for row in part.rows)
-            gaps = np.array([max(slack_at(g, q, 0.0, 1.0) + margin, deepest) for q in dense])
+            # the judge counts at most a capsule's own radius as its depth
+            gaps = np.full(len(dense), np.inf)
+            for row, name in zip(rows[mine], np.array(body.names)[mine], strict=True):
+                g = robot_arrays((arm,), (Body(row[None], (str(name),)),), pack([obstacles[k]]), margin=0.01)
+                gaps = np.minimum(gaps, [max(slack_at(g, q, 0.0, 1.0) + margin, -row[-1]) for q in dense])
             excess = max(excess, min(margin, gaps[0], gaps[-1]) - gaps.min())
     found = certify(log)
-    assert excess - 1e-3 <= found.contact_excess <= excess + 2e-3
+    assert excess - 1e-3 <= found.contact_excess
+    # it is examined until it is known whether the room that every contact has is exceeded
+    assert excess > CONTACT_ROOM - 2e-3 or found.contact_excess <= CONTACT_ROOM + 1e-6
     assert any(reason.startswith("contacts: ") for reason in found.reasons) == (
         found.contact_excess > CONTACT_ROOM + 1e-6
     )
