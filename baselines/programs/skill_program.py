@@ -229,15 +229,25 @@ class SkillProgram:
 
     def _reach(self, phase: Phase) -> Iterator[np.ndarray]:
         """Go to a thing that is moved on its hinge."""
-        executor, at = self.executor, self._pose(phase.reference)
+        executor, at = self.executor, self._stood(phase)
         motion = self._motion(phase, tuple(at @ end for end in ends_alike(phase)), _contacts(HAND, phase.touching))
         executor.allow(motion.allowed)
         choice = executor.choose(motion)
         self.paths.append(LabeledPath("final", phase.name, choice.path))
         yield from executor.go(choice)
+        yield from self._end(phase)
+
+    def _stood(self, phase: Phase) -> Pose:
+        """Return where what moves on its joints stood at first, as it is recorded: it is pushed from there."""
+        return self._starts.setdefault(phase.reference, self._pose(phase.reference))
+
+    def _end(self, phase: Phase) -> Iterator[np.ndarray]:
+        """Close or open the hand as at the end of a phase in which it holds no free object."""
         if phase.gripper == "close":
-            yield from executor.wait(self.settings.settle)
-            yield from executor.grip(CLOSE, self.settings.close)
+            yield from self.executor.wait(self.settings.settle)
+            yield from self.executor.grip(CLOSE, self.settings.close)
+        elif phase.gripper == "open":
+            yield from self.executor.grip(OPEN, self.settings.open)
 
     def _slide(self, phase: Phase) -> Iterator[np.ndarray]:
         """Move the object along what it touches as was commanded, from where the hand has brought it."""
@@ -259,12 +269,11 @@ class SkillProgram:
     def _push(self, phase: Phase) -> Iterator[np.ndarray]:
         """Follow what was commanded where the hand pushes, relative to where the thing is."""
         path = self._paths[phase.name]
-        here = self._starts.setdefault(phase.name, self._pose(phase.reference))
+        here = self._stood(phase)
         shown = path[-1] @ phase.goals[0].inverse()
         self.executor.allow(_contacts(HAND, phase.touching))
         yield from self.executor.follow(path.moved(here @ shown.inverse()), detours=False, exact=False)
-        if phase.gripper == "open":
-            yield from self.executor.grip(OPEN, self.settings.open)
+        yield from self._end(phase)
 
     def _withdraw(self) -> Iterator[np.ndarray]:
         """Move away from what was released, as shown, or back as the hand came."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ...envs import TaskDescription
@@ -31,10 +31,10 @@ def skill_of(
     """
     if task is None:
         return infer_skill(demonstration)
-    known = things_of(task)
-    found = _counterparts(demonstration, known, {**demonstration.corrections.names, **(names or {})})
-    skill = infer_skill(demonstration, {shown: known[name] for shown, name in found.items()})
-    return _in_task(skill, found, known)
+    solid, frames = things_of(task), [each.name for each in task.furniture if not each.parts]
+    found = _counterparts(demonstration, [*solid, *frames], {**demonstration.corrections.names, **(names or {})})
+    skill = infer_skill(demonstration, {shown: solid[name] for shown, name in found.items() if name in solid})
+    return _in_task(skill, found, task)
 
 
 def things_of(task: TaskDescription) -> dict[str, Thing]:
@@ -46,7 +46,7 @@ def things_of(task: TaskDescription) -> dict[str, Thing]:
     return things
 
 
-def _counterparts(demonstration: Demonstration, known: Mapping[str, Thing], given: Mapping[str, str]) -> dict[str, str]:
+def _counterparts(demonstration: Demonstration, known: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
     """Return the task's names of the things in a demonstration that it has."""
     shown = [*demonstration.object_paths, *demonstration.fixtures]
     for name in given:
@@ -63,23 +63,35 @@ def _counterparts(demonstration: Demonstration, known: Mapping[str, Thing], give
     return found
 
 
-def _in_task(skill: Skill, found: Mapping[str, str], known: Mapping[str, Thing]) -> Skill:
+def _in_task(skill: Skill, found: Mapping[str, str], task: TaskDescription) -> Skill:
     """Return a skill with a task's names, without the phases whose thing the task does not have."""
     absent = {phase.thing for phase in skill.phases if phase.thing and phase.thing not in found}
-    phases = tuple(_renamed(phase, found, known) for phase in skill.phases if phase.thing not in absent)
+    phases = tuple(_renamed(phase, found, task) for phase in skill.phases if phase.thing not in absent)
     if not any(phase.thing for phase in phases):
-        reason = f"shows {', '.join(sorted(absent))}, none of which the task has; it has {', '.join(known)}: give names"
+        known = ", ".join(_names(task))
+        reason = f"shows {', '.join(sorted(absent))}, none of which the task has; it has {known}: give names"
         raise BadDemonstration(skill.name, "object_paths", reason)
     notes = tuple(f"{name} is not in the task: what was shown with it is left out" for name in sorted(absent))
     return replace(skill, phases=phases, notes=(*skill.notes, *notes))
 
 
-def _renamed(phase: Phase, found: Mapping[str, str], known: Mapping[str, Thing]) -> Phase:
+def _renamed(phase: Phase, found: Mapping[str, str], task: TaskDescription) -> Phase:
     if phase.reference and phase.reference not in found:
-        raise UnknownName(f"thing of the task, to which {phase.name!r} refers,", phase.reference, known)
+        raise UnknownName(f"thing of the task, to which {phase.name!r} refers,", phase.reference, _names(task))
+    touching = [found[name] for name in phase.touching if name in found]
     return replace(
         phase,
         thing=found.get(phase.thing, ""),
         reference=found.get(phase.reference, ""),
-        touching=tuple(found[name] for name in phase.touching if name in found),
+        touching=tuple(dict.fromkeys(name for each in touching for name in _assembly(each, task))),
     )
+
+
+def _assembly(name: str, task: TaskDescription) -> tuple[str, ...]:
+    """Return the names of a thing and of all that belong to the same assembly: a hand opens a door by its latch."""
+    whole = next((each.assembly or each.name for each in task.furniture if each.name == name), name)
+    return (name, *(each.name for each in task.furniture if whole in (each.name, each.assembly) and each.parts))
+
+
+def _names(task: TaskDescription) -> list[str]:
+    return [each.name for each in (*task.objects, *task.furniture, *task.fixtures)]

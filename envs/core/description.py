@@ -74,11 +74,13 @@ class TaskFurniture:
 
     Attributes:
         name: unique name.
-        parts: solids in the furniture's frame.
+        parts: solids in the furniture's frame; none where it is only the frame of an assembly.
+        assembly: name of the furniture that it is a part of, as a latch is of its door; "" if it stands by itself.
     """
 
     name: str
     parts: tuple[Obstacle, ...]
+    assembly: str = ""
 
     @staticmethod
     def of(thing: Furniture) -> TaskFurniture:

@@ -161,11 +161,11 @@ def _is_robot(model: mujoco.MjModel, body: int) -> bool:
 
 
 def _is_fixture(model: mujoco.MjModel, body: int, free: list[int]) -> bool:
-    """Return whether a body stands in the scene, or turns on one of its joints, and is solid."""
+    """Return whether a body stands in the scene, or turns on one of its joints, and is solid or has solid parts."""
     if body == FLOOR_BODY or _is_robot(model, body) or int(model.body_rootid[body]) in free:
         return False
-    name = model.body(body).name
-    return name != TABLE and model.body_mocapid[body] < 0 and bool(solid_geoms(model, [body]))
+    whole = _tree(model, body) if model.body_parentid[body] == FLOOR_BODY else [body]
+    return model.body(body).name != TABLE and model.body_mocapid[body] < 0 and bool(solid_geoms(model, whole))
 
 
 def _is_of_scene(model: mujoco.MjModel, joint: int) -> bool:
@@ -173,7 +173,7 @@ def _is_of_scene(model: mujoco.MjModel, joint: int) -> bool:
 
 
 def _tree(model: mujoco.MjModel, body: int) -> list[int]:
-    """Return a free body and all that are fixed to it."""
+    """Return a body that stands in the world, or is free, and all that are attached to it."""
     return [int(each) for each in np.flatnonzero(model.body_rootid == body)]
 
 
@@ -188,8 +188,9 @@ def _object(model: mujoco.MjModel, body: int, name: str) -> TaskObject:
 
 
 def _furniture(model: mujoco.MjModel, body: int) -> TaskFurniture:
-    name = model.body(body).name.removesuffix("_main")
-    return TaskFurniture(name, body_solids(model, body, solid_geoms(model, [body]), name))
+    name, root = (str(model.body(each).name).removesuffix("_main") for each in (body, int(model.body_rootid[body])))
+    parts = body_solids(model, body, solid_geoms(model, [body]), name)
+    return TaskFurniture(name, parts, "" if root == name else root)
 
 
 def _with_hand(model: mujoco.MjModel, owner: np.ndarray) -> np.ndarray:

@@ -27,6 +27,8 @@ def placement_motions(
     things = {each.name: each for each in guest.objects}
     poses = {each.name: Pose.from_vector(row) for each, row in zip(guest.objects, objects, strict=True)}
     for each, row in zip(guest.furniture, furniture, strict=True):
+        if not each.parts:
+            continue
         things[each.name] = TaskObject(each.name, hull_of(each.parts), 2.0 * np.pi, each.parts)
         poses[each.name] = Pose.from_vector(row)
     places = PLACES.get(guest.task, {each.name: Place("reach") for each in guest.objects})

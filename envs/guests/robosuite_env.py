@@ -44,7 +44,8 @@ class RobosuiteEnv(TaskEnv[GuestProgress]):
     The objects of `task.objects` are the free bodies that take part, each with its convex solids `parts`. Objects that
     robosuite hides stand on the floor beside the scene: left out where it is always the same ones, kept where each
     episode draws which one takes part. The table is the fixture "table"; all else that is solid and not free (pegs,
-    bins, the door, its frame and its latch) is `task.furniture`. Joints of the scene are named in
+    bins, the door, its frame and its latch) is `task.furniture`. Parts of a whole, like those of the door, name it as
+    their `assembly`; its own frame, without solids, is in the list, too. Joints of the scene are named in
     `task.scene_joints`.
 
     ## Action Space

@@ -28,6 +28,8 @@ HALF_TURN = 3.0
 """Angle [rad] beyond which the direction of a screw's axis is uncertain."""
 LEVER = 0.5
 """Largest distance [m] of two tool frames."""
+ASIDE = 0.002
+"""Distance [m] of a recorded base from the assumed one that is none: tool frames of two models differ by as much."""
 DOUBTFUL = "only up to another base and another tool frame: are its quaternions wxyz?"
 """What is said where screws agree, and neither a base nor a tool frame alone explains the poses."""
 LOOKS = 200
@@ -284,6 +286,25 @@ def checked_against_joints(path: str | Path | None, key: str, poses: PosePath, j
         if distance.max() < SAME_TRAVEL and angle.max() < SAME_ANGLE:
             return f"agrees with the joints up to {frames}"
     return f"agrees with the joints {DOUBTFUL}"
+
+
+def base_in(poses: PosePath, joints: PosePath) -> Pose:
+    """Return where the base stood from which the joints reach recorded poses; as assumed if that explains them as well.
+
+    Objects are recorded in the same world as the poses: a hand at an assumed base would grasp beside them.
+
+    Args:
+        poses: n recorded poses of the tcp in the world.
+        joints: n poses of the tcp by forward kinematics, from the assumed base.
+
+    Returns:
+        `world_from_assumed`, with which `joints` moved are nearest to `poses`.
+    """
+    rows = dq.mul(poses.dqs, dq.conj(joints.dqs))
+    rows *= np.where(rows[:, :4] @ rows[0, :4] < 0.0, -1.0, 1.0)[:, None]
+    base = Pose(dq.normalized(rows.mean(axis=0)))
+    apart, left = (dq.pose_distance(poses.dqs, path.dqs)[0].max() for path in (joints, joints.moved(base)))
+    return base if left < min(SAME_TRAVEL, 0.5 * apart) and apart > ASIDE else Pose.identity()
 
 
 def _difference(recorded: Pose, computed: Pose) -> str:

@@ -19,7 +19,7 @@ from ..imitation.npz_arrays import numbers, read_arrays, texts, unit_poses
 from ..robot.arm import Arm
 from .column_names import GRIPPER, UR_JOINTS
 from .gripper_signal import gripper_command
-from .kinematic_check import checked_against_joints, joints_path
+from .kinematic_check import base_in, checked_against_joints, joints_path
 from .recording import Recording, blame_of
 from .time_stamps import seconds_of
 
@@ -40,7 +40,7 @@ OSC_POSE = 7
 def recording_from_teleoperation(
     path: str | Path, arm: Arm, *, tcp_frame: str = "grip_site", ignored: Sequence[str] = (), time_unit: str = ""
 ) -> Recording:
-    """Read a teleoperation. The hand's path is that of the joints, by the arm's forward kinematics.
+    """Read a teleoperation. The hand's path is that of the joints, by forward kinematics, from where the base stood.
 
     Args:
         path: .npz file, see this module.
@@ -67,6 +67,7 @@ def recording_from_teleoperation(
     for key in arrays:
         if key.startswith("ee_"):
             notes.append(f"{key} {checked_against_joints(path, key, _poses(path, key, arrays[key]), hand)}")
+    hand, about_base = _in_world(path, arrays, hand)
     is_osc = actions.shape[1] == OSC_POSE
     known = "actions are read as robosuite's OSC_POSE: the commanded path is kept"
     notes.append(
@@ -84,8 +85,23 @@ def recording_from_teleoperation(
         fixtures=fixtures,
         commanded=commanded_path(hand, actions[:, :6]) if is_osc else None,
         is_computed=True,
-        notes=tuple(note for note in (about_time, about_gripper, about_order, *notes) if note),
+        notes=tuple(note for note in (about_time, about_gripper, about_order, *notes, about_base) if note),
     )
+
+
+def _in_world(path: Path, arrays: dict[str, np.ndarray], hand: PosePath) -> tuple[PosePath, str]:
+    """Return the hand's path in the world of the recorded poses, and a note if the base stands elsewhere in it."""
+    key = next((key for key in arrays if key.startswith("ee_")), "")
+    if not key:
+        return hand, ""
+    base = base_in(_poses(path, key, arrays[key]), hand)
+    moved = 1e3 * base.position
+    if not moved.any():
+        return hand, ""
+    by = f"({', '.join(f'{each:.0f}' for each in moved)}) mm"
+    return hand.moved(
+        base
+    ), f"the robot's base stood {by} from its usual place, by {key}: the hand's path is moved there"
 
 
 def _left(path: Path, arrays: dict[str, np.ndarray], ignored: Sequence[str]) -> tuple[dict[str, np.ndarray], list[str]]:

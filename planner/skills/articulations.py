@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..geometry.pose import Pose
 from ..imitation.demonstration import Demonstration
-from .grips import Grip, closings, joint_events
+from .grips import Grip, closings
+from .names import plain
 
 FINGERS = re.compile(r"finger|gripper|knuckle|thumb|jaw", re.IGNORECASE)
 """Names of joints that are the hand's own."""
 BEFORE = 0.03
 """Path length [m] of the hand before a joint moves that belongs to the push."""
+HOLDS = 0.10
+"""Path length [m] before a push from which a hand that closes takes hold of what it moves; farther off it makes a fist.
+"""
+STIRS = 0.02
+"""Fraction of a joint's whole motion that it moves by itself, or as fingers close about what it carries."""
 TOGETHER = 1.0
 """Time [s] between the motions of two joints, as of a handle and its door, that are one push."""
 
@@ -27,7 +33,8 @@ class Articulation(NamedTuple):
         joints: their names.
         held: first sample of the push.
         released: last sample.
-        closed: whether the hand was closed.
+        grips: (sample, "close" or "open") of the hand's actions from before the push to its end, in order.
+        opens: whether the hand opens after the push, so that it lets go.
         reference: the fixture that the push is relative to; "" for the world.
         place: its pose.
     """
@@ -35,7 +42,8 @@ class Articulation(NamedTuple):
     joints: tuple[str, ...]
     held: int
     released: int
-    closed: bool
+    grips: tuple[tuple[int, str], ...]
+    opens: bool
     reference: str
     place: Pose
 
@@ -60,15 +68,49 @@ def articulations(demonstration: Demonstration, held: Sequence[Grip]) -> list[Ar
     return [_articulation(demonstration, *span) for span in merged]
 
 
+def joint_events(joints: Mapping[str, np.ndarray], still: float = 0.02) -> dict[str, tuple[int, int]]:
+    """Return the first and the last sample of the motion of each joint that moved.
+
+    Args:
+        joints: (n,) positions [rad or m] by name.
+        still: change below which a joint has not moved.
+    """
+    moved = {}
+    for name, values in joints.items():
+        whole = float(np.ptp(values))
+        if whole > still:
+            away = np.flatnonzero(np.abs(values - values[0]) > max(0.1 * still, STIRS * whole))
+            back = np.flatnonzero(np.abs(values - values[-1]) > 0.1 * still)
+            last = int(back[-1]) + 1 if len(back) else len(values) - 1
+            moved[name] = (max(0, int(away[0]) - 1), min(len(values) - 1, last))
+    return moved
+
+
 def _articulation(demonstration: Demonstration, start: int, stop: int, names: tuple[str, ...]) -> Articulation:
     lengths = demonstration.path.lengths()
-    first = max(1, int(np.searchsorted(lengths, lengths[start] - BEFORE)))
+    held = max(1, int(np.searchsorted(lengths, lengths[start] - BEFORE)))
     assert demonstration.gripper is not None
-    shut = [each for each in closings(demonstration.gripper) if each.start <= stop and start <= each.stop]
-    if shut:
-        first = max(1, min(shut[0].start - 1, start) if shut[0].start > first else first)
-    here = demonstration.path[start].position
-    gaps = {name: float(np.linalg.norm(pose.position - here)) for name, pose in demonstration.fixtures.items()}
-    reference = min(gaps, key=lambda name: gaps[name]) if gaps else ""
+    shut = [each for each in closings(demonstration.gripper) if each.start <= stop and held <= each.stop]
+    actions = [(each.start, "close") for each in shut]
+    actions += [(each.stop + 1, "open") for each in shut if each.opens and each.stop < stop]
+    taken = [sample for sample, action in actions if action == "close" and sample <= start]
+    if taken and taken[-1] > 0 and lengths[start] - lengths[taken[-1]] < HOLDS:
+        held = taken[-1]
+    reference = _reference(names, demonstration.path[start].position, demonstration.fixtures)
     place = demonstration.fixtures.get(reference, Pose.identity())
-    return Articulation(names, first, stop, bool(shut), reference, place)
+    opens = bool(shut) and shut[-1].opens and shut[-1].stop >= stop
+    return Articulation(names, held, stop, tuple(sorted(actions)), opens, reference, place)
+
+
+def _reference(joints: tuple[str, ...], here: np.ndarray, fixtures: Mapping[str, Pose]) -> str:
+    """Return the fixture that joints belong to: of those whose names begin with the same word, or of all, the nearest.
+
+    Args:
+        joints: names of the joints.
+        here: (3,) position of the hand [m].
+        fixtures: poses of the fixtures.
+    """
+    words = {plain(joint.split("_")[0]) for joint in joints}
+    alike = [name for name in fixtures if plain(name.split("_")[0]) in words]
+    gaps = {name: float(np.linalg.norm(fixtures[name].position - here)) for name in alike or fixtures}
+    return min(gaps, key=lambda name: gaps[name]) if gaps else ""

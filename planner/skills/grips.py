@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -183,19 +182,3 @@ def _rested(time: np.ndarray, path: PosePath, released: int) -> Pose | None:
 
 def _samples(time: np.ndarray, seconds: float) -> int:
     return max(1, round(seconds / float(np.median(np.diff(time)))))
-
-
-def joint_events(joints: Mapping[str, np.ndarray], still: float = 0.02) -> dict[str, tuple[int, int]]:
-    """Return the first and the last sample of the motion of each joint that moved.
-
-    Args:
-        joints: (n,) positions [rad or m] by name.
-        still: change below which a joint has not moved.
-    """
-    moved = {}
-    for name, values in joints.items():
-        away = np.flatnonzero(np.abs(values - values[0]) > 0.1 * still)
-        if len(away) and np.ptp(values) > still:
-            back = np.flatnonzero(np.abs(values - values[-1]) > 0.1 * still)
-            moved[name] = (max(0, int(away[0]) - 1), min(len(values) - 1, int(back[-1]) + 1))
-    return moved

@@ -16,8 +16,9 @@ from ..imitation.demonstration import Demonstration
 from ..imitation.segmentation import trimmed
 from .alike import hand_turns, own_turns, reference_turns
 from .articulations import Articulation, articulations
-from .corrected import corrected, regrasped, said_path, said_reference
+from .corrected import corrected, regrasped, said_reference
 from .grips import BRIEF, Closing, Grip, grips
+from .pushes import at_time, phases_of_push, same_sign
 from .references import Reference, reference_of
 from .skill import START, Choice, Phase, Skill
 from .slides import slide_of, slides_from
@@ -69,13 +70,15 @@ def infer_skill(demonstration: Demonstration, things: Mapping[str, Thing] | None
     choices: list[Choice] = []
     notes: list[str] = []
     begin, last = 0, None
+    done: list[str] = []
     for event in sorted([*held, *hinged], key=lambda event: event.held):
-        number = len(phases) // 2 + 1
+        done.append(event.name if isinstance(event, Grip) else event.reference)
+        number = done.count(done[-1])
         if isinstance(event, Grip):
             new, open_choices = _fetch_and_carry(demonstration, scene, event, begin, number)
             choices += open_choices
         else:
-            new = _turn_on_its_hinge(demonstration, event, begin, number)
+            new = phases_of_push(demonstration, event, begin, number)
         phases += new
         begin, last = event.released, event
     notes += [_left_out(demonstration, closing) for closing in empty if not _belongs(closing, hinged)]
@@ -128,24 +131,20 @@ def _fetch_and_carry(
         kind="reach",
         thing=grip.name,
         reference=grip.name,
-        path=PosePath(np.concatenate([shown.dqs[:-1], _same_sign(shown.dqs[-1], ends)[None]])),
+        path=PosePath(np.concatenate([shown.dqs[:-1], same_sign(shown.dqs[-1], ends)[None]])),
         goals=(grip.object_from_tcp,),
         left=own_turns(thing, grip.undisturbed),
         right=hand_turns(),
         object_from_tcp=grip.object_from_tcp,
         gripper="close",
         touching=(grip.name,),
-        evidence=(f"{grip.name} moves with the hand from {_at(demonstration, grip.held)} on",),
+        evidence=(f"{grip.name} moves with the hand from {at_time(demonstration, grip.held)} on",),
     )
     carry, choices = _carry(demonstration, scene, grip, number)
     begins = slides_from(demonstration, grip, carry)
     if begins is None:
         return [reach, carry], choices
     return [reach, *slide_of(demonstration, grip, carry, begins, TRIM)], choices
-
-
-def _same_sign(dq: np.ndarray, pose: Pose) -> np.ndarray:
-    return pose.dq if dq[:4] @ pose.dq[:4] >= 0.0 else -pose.dq
 
 
 def _carry(demonstration: Demonstration, scene: Scene, grip: Grip, number: int) -> tuple[Phase, list[Choice]]:
@@ -215,39 +214,6 @@ def _open_choice(phase: Phase, reference: Reference) -> list[Choice]:
     return [Choice(phase.name, "reference", reference.name, reference.others, reference.why)]
 
 
-def _turn_on_its_hinge(demonstration: Demonstration, event: Articulation, begin: int, number: int) -> list[Phase]:
-    """Return the phases of reaching a hinged thing and moving it; where it pushes, what was commanded is followed."""
-    suffix = "" if number == 1 else f" ({number})"
-    name = event.reference or "the world"
-    commanded, why = said_path(demonstration, f"move {name}{suffix}")
-    first, at = demonstration.path[event.held], event.place
-    reach = Phase(
-        name=f"reach {name}{suffix}",
-        kind="reach",
-        thing=event.reference,
-        reference=event.reference,
-        path=demonstration.path[min(begin, event.held - 1) : event.held + 1],
-        goals=(at.inverse() @ first,),
-        gripper="close" if event.closed else "none",
-        touching=(event.reference,) if event.reference else (),
-        evidence=(f"{', '.join(event.joints)} moves from {_at(demonstration, event.held)} on",),
-    )
-    path = commanded[event.held : event.released + 1]
-    turn = Phase(
-        name=f"move {name}{suffix}",
-        kind="articulate",
-        thing=event.reference,
-        reference=event.reference,
-        path=PosePath(np.concatenate([_same_sign(path.dqs[0], first)[None], path.dqs[1:]])),
-        goals=(at.inverse() @ path[-1],),
-        gripper="open" if event.closed else "none",
-        touching=(event.reference,) if event.reference else (),
-        exact=True,
-        evidence=(why,),
-    )
-    return [reach, turn]
-
-
 def _withdrawal(demonstration: Demonstration, begin: int, last: Grip | Articulation | None) -> list[Phase]:
     """Return the hand's motion after the last release, if it was shown."""
     rest = demonstration.path[begin:]
@@ -262,10 +228,6 @@ def _withdrawal(demonstration: Demonstration, begin: int, last: Grip | Articulat
             reference=START,
             path=path,
             goals=(path[0].inverse() @ path[-1],),
-            evidence=(f"the hand moves on from {_at(demonstration, begin)}",),
+            evidence=(f"the hand moves on from {at_time(demonstration, begin)}",),
         )
     ]
-
-
-def _at(demonstration: Demonstration, sample: int) -> str:
-    return f"{demonstration.time[sample] - demonstration.time[0]:.1f} s"

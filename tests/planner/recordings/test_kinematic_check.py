@@ -9,7 +9,7 @@ from helpers.strategies import for_all, random_dq, st
 
 from onedemo.planner.errors import BadDemonstration
 from onedemo.planner.geometry.pose import Pose, PosePath
-from onedemo.planner.recordings.kinematic_check import DOUBTFUL, checked_against_joints, joints_path
+from onedemo.planner.recordings.kinematic_check import DOUBTFUL, base_in, checked_against_joints, joints_path
 
 
 def motion(rng: np.random.Generator) -> PosePath:
@@ -33,6 +33,16 @@ def test_poses_in_any_frames_agree_and_the_words_say_which(seed):
     assert checked_against_joints("x", "poses", path.moved(base), path).endswith("up to another base")
     assert checked_against_joints("x", "poses", path.with_tool(tool), path).endswith("up to another tool frame")
     assert checked_against_joints("x", "poses", path.moved(base).with_tool(tool), path).endswith(DOUBTFUL)
+
+
+@for_all(st.integers(0, 10**6), max_examples=40)
+def test_the_recorded_base_is_found_where_it_alone_explains_the_poses(seed):
+    rng = np.random.default_rng(seed)
+    path, base, tool = motion(rng), frame(rng, 2.0), frame(rng, 0.15)
+    distance, angle = base_in(path.moved(base), path).distance_to(base)
+    assert distance < 1e-6 and angle < 1e-6
+    for poses in (path, path.with_tool(tool), path.with_tool(Pose.from_position_quaternion([0, 0, 0.001]))):
+        assert base_in(poses, path).distance_to(Pose.identity()) == (0.0, 0.0)
 
 
 def mixed(path: PosePath) -> PosePath:

@@ -10,7 +10,7 @@ from helpers.arms import table_panda
 from helpers.strategies import assert_same_pose
 
 from onedemo.planner.errors import BadDemonstration, UnknownName
-from onedemo.planner.geometry.pose import PosePath
+from onedemo.planner.geometry.pose import Pose, PosePath
 from onedemo.planner.recordings.kinematic_check import joints_path
 from onedemo.planner.recordings.teleoperation import commanded_path, recording_from_teleoperation
 
@@ -55,6 +55,18 @@ def test_all_that_is_recorded_is_kept(tmp_path):
     assert_same_pose(found.hand.dqs, PosePath.from_vectors(arrays["ee_gripper0_grip_site"]).dqs, 1e-9)
     np.testing.assert_allclose(found.commanded.positions - found.hand.positions, 0.005, atol=1e-12)
     assert any("agrees with the joints to 0.0 mm" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("base", [[-0.06, 0.1, 0.0, 1, 0, 0, 0], [0.008, 0, 0, 1, 0, 0, 0], [1, 0, 0, 0.6, 0, 0, 0.8]])
+def test_the_hand_is_where_the_objects_were_recorded(base, tmp_path):
+    """The robot may stand elsewhere than this project's: hand and objects must be in one world."""
+    arrays, base = teleoperation(), Pose.from_vector(np.array(base, dtype=float))
+    usual = read(tmp_path, arrays)
+    arrays["ee_gripper0_grip_site"] = usual.hand.moved(base).vectors
+    found = read(tmp_path, arrays)
+    assert_same_pose(found.hand.dqs, usual.hand.moved(base).dqs, 1e-9)
+    np.testing.assert_allclose(found.commanded.positions - found.hand.positions, 0.005, atol=1e-9)
+    assert any("base stood" in note for note in found.notes) and not any("base stood" in note for note in usual.notes)
 
 
 def test_commands_turn_about_the_axes_of_the_world():

@@ -10,7 +10,7 @@ from helpers.planner.shown_skills import Move, at, demonstrated, hand, is_near, 
 from helpers.strategies import for_all, st
 
 from onedemo.planner.geometry.pose import Pose, PosePath
-from onedemo.planner.skills.grips import closings, grips, joint_events
+from onedemo.planner.skills.grips import closings, grips
 
 
 @for_all(st.floats(0.0, 0.3), st.floats(-0.3, 0.3), st.floats(-3.0, 3.0), max_examples=15)
@@ -78,14 +78,6 @@ def test_closings_are_the_spans_of_positive_commands(commands):
         closed[span.start : span.stop + 1] = True
         assert span.opens == (span.stop + 1 < len(commands))
     np.testing.assert_array_equal(closed, np.array(commands) > 0.0)
-
-
-def test_joints_that_move_are_found_with_their_spans():
-    door = np.concatenate([np.zeros(10), np.linspace(0, 0.8, 20), np.full(10, 0.8)])
-    events = joint_events({"door": door, "still": np.zeros(40) + 0.001})
-    assert list(events) == ["door"]
-    start, stop = events["door"]
-    assert 8 <= start <= 10 and 28 <= stop <= 31
 
 
 def test_an_object_that_settles_at_first_is_not_carried():

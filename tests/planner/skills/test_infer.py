@@ -87,22 +87,6 @@ def test_two_objects_are_two_times_two_phases_in_the_order_shown():
     assert len({phase.name for phase in skill.phases}) == 4
 
 
-def test_a_push_on_a_hinge_follows_what_was_commanded():
-    moves = [Move(hand(0.5, 0.2, 0.1), 40), Move(hand(0.5, 0.4, 0.1), 40)]
-    count = 1 + 40 + 12 + 40 + 12
-    angle = np.concatenate([np.zeros(60), np.linspace(0, 0.6, 33), np.full(count - 93, 0.6)])
-    shown = demonstrated(
-        hand(0.3, -0.1, 0.3), moves, {}, fixtures={"door": at(0.6, 0.2, 0.1)}, joints={"door_hinge": angle}
-    )
-    ahead = shown.path.moved(Pose.from_position_quaternion([0, 0.01, 0]))
-    reach, push = infer_skill(replace(shown, commanded=ahead)).phases
-    assert (reach.kind, push.kind) == ("reach", "articulate") and push.reference == "door" and push.exact
-    assert is_near(at(0.6, 0.2, 0.1) @ reach.goals[0], push.path[0])
-    assert is_near(push.path[-1], ahead[92], 0.02)
-    measured = infer_skill(shown).phases[1]
-    assert "not recorded" in measured.evidence[0] and is_near(measured.path[-1], shown.path[92], 0.02)
-
-
 def test_fingers_are_no_hinges():
     shown = pick_and_place(at(0.5, 0.0, 0.02))
     fingers = np.linspace(0.0, 0.04, len(shown.time))
