@@ -24,6 +24,11 @@ def board() -> Fixture:
     return Fixture("board", (Part(Box(BOARD), (0.0, 0.0, 0.5 * top)), *stains), friction=0.5, color=WHITE)
 
 
+def on_board(y):
+    """Return a place of the sponge on the board."""
+    return At("board", (0, y, BOARD[2] + 0.5 * SPONGE[2]))
+
+
 def wiped(scene) -> set:
     """Return the stains that the sponge has passed over in contact with the board, so far in the episode."""
     done = scene.memory.setdefault("wiped", set())
@@ -49,13 +54,13 @@ def script(observation):
     board = Pose.from_vector(observation["furniture_pose"][0])
     hand = Pose.from_yaw([0, 0, 0.006], 0.5 * np.pi) @ Pose.from_position_quaternion([0, 0, 0], (0, 1, 0, 0))
 
-    def on_board(y, height):
+    def above(y, height):
         return board @ Pose.from_position_quaternion([0, y, BOARD[2] + 0.5 * SPONGE[2] + height]) @ hand
 
     def up(height, pose):
         return Pose.from_position_quaternion([0, 0, height]) @ pose
 
-    grasp, start, end = sponge @ hand, on_board(BEFORE, -PRESS), on_board(AFTER, -PRESS)
+    grasp, start, end = sponge @ hand, above(BEFORE, -PRESS), above(AFTER, -PRESS)
     yield ScriptedMotion("approach", (Waypoint(up(0.08, grasp)), Waypoint(grasp, 0.1)), "sponge", gripper=1.0)
     yield ScriptedMotion("lift", (Waypoint(up(0.08, grasp), 0.15),), held="sponge")
     yield ScriptedMotion("carry", (Waypoint(up(0.05, start)), Waypoint(start, 0.05)), "board", held="sponge")
@@ -72,7 +77,8 @@ WIPE_BOARD = Task(
         "sponge": Range((-0.05, -0.20), shift=(0.04, 0.08), turn=(np.deg2rad(15), np.deg2rad(30))),
         "board": Range((0.02, 0.10), shift=(0.04, 0.07), turn=(np.deg2rad(15), np.deg2rad(30))),
     },
-    goals={"sponge": At("board", (0, AFTER, BOARD[2] + 0.5 * SPONGE[2]))},
+    goals={"sponge": on_board(AFTER)},
+    passes={"sponge": (on_board(BEFORE), on_board(STAINS[1]))},
     success=Success(
         {"sponge": Tolerance(xy=0.012, z=0.003)},
         also=clean,

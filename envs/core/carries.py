@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...planner import Pose, Shape, Sphere
@@ -56,19 +58,21 @@ def reach_motion(home: Pose, corners: np.ndarray) -> PlacementMotion:
     return PlacementMotion(home, grasp, tuple(_keys(grasp)), FINGERTIP, Pose.identity(), motion=0)
 
 
-def carry_motion(shape: Shape, pose: Pose, grasp: Pose, there: Pose) -> PlacementMotion:
-    """Return the hand's way with an object from above a grasp to above its place.
+def carry_motion(shape: Shape, pose: Pose, grasp: Pose, there: Pose, passing: Sequence[Pose] = ()) -> PlacementMotion:
+    """Return the hand's way with an object from above a grasp to above its place, or to above the first one it passes.
 
     Args:
         shape: shape of the object.
         pose: its pose.
         grasp: tcp pose of the grasp.
         there: tcp pose at the place.
+        passing: tcp poses that must be passed before that.
     """
+    places = (*passing, there)
     return PlacementMotion(
         start=_above(grasp, RAISED),
-        end=_above(there, RAISED),
-        keys=(*_keys(grasp), *_keys(there)),
+        end=_above(places[0], RAISED),
+        keys=(*_keys(grasp), *(key for place in places for key in _keys(place))),
         shape=shape,
         tcp_from_object=grasp.inverse() @ pose,
         motion=1,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...planner import Pose
 from ..mujoco_library import mujoco
 from ..scene.scene import FIRST_OBJECT, FURNITURE, WORLD
 from ..simulation.simulation import Simulation, Start
@@ -49,6 +50,17 @@ class Arrangement:
         near = {frozenset((labels[a], labels[b])) for a, b in pairs if _gap(sim, a, b, gap) < gap}
         # things that are near each other in the nominal layout are meant to be
         self._apart = [pair for pair in pairs if frozenset(labels[each] for each in pair) not in near]
+
+    def passed(self, name: str, objects: np.ndarray, fixtures: np.ndarray) -> list[Pose]:
+        """Return the poses that an object must pass before its goal.
+
+        Args:
+            name: of the object.
+            objects: (n, 7) poses of the objects.
+            fixtures: (m, 7) poses of the fixtures.
+        """
+        rows = zip(self._task.names, [*objects, *fixtures], strict=True)
+        return self._layouts.passed(name, {each: Pose.from_vector(row) for each, row in rows})
 
     def drawn(
         self, sim: Simulation, rng: np.random.Generator, layout: str, objects: np.ndarray | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -110,6 +111,16 @@ class TaskLayouts:
         free = {name: Pose.from_vector(row) for (name, where), row in goals if isinstance(where, Range)}
         return self._goals(poses, free)
 
+    def passed(self, name: str, poses: Mapping[str, Pose]) -> list[Pose]:
+        """Return the poses that an object must pass before its goal.
+
+        Args:
+            name: of the object.
+            poses: where all things are.
+        """
+        places = self.task.passes.get(name, ())
+        return [poses[where.thing] @ self._relative(name, where) for where in places]
+
     def _drawn_pose(self, rng: np.random.Generator, layout: str, name: str, where: Range) -> Pose:
         shift, turn = where.reach(layout)
         place = where.nominal(self._robot) + rng.uniform(-shift, shift)
@@ -132,10 +143,10 @@ class TaskLayouts:
             return poses[name]
         assert isinstance(where, At)
         thing = self._resolve(where.thing, poses, found)
-        found[name] = thing @ self._relative(name, where, thing)
+        found[name] = thing @ self._relative(name, where)
         return found[name]
 
-    def _relative(self, name: str, where: At, thing: Pose) -> Pose:
+    def _relative(self, name: str, where: At) -> Pose:
         """Return `thing_from_object` at the goal."""
         turned = Pose.from_position_quaternion([0.0, 0.0, 0.0], where.rotation)
         if where.at is not None:

@@ -44,6 +44,8 @@ class Task:
         skill: what the demonstration shows (`onedemo.skill_of`), if it is written by hand; None: found in it.
         grasps: poses of the hand in an object's frame that can hold it, by object: only to place obstacles; missing
             ones are from above.
+        passes: places that an object must pass before its goal, as a sponge passes all of a board: only to leave them
+            clear of obstacles; missing ones are none.
         apart: least gap [m] between things at the start.
         seconds: time limit [s].
         script: motions (`onedemo.baselines.ScriptedMotion`) that do the task for the first observation, for
@@ -63,6 +65,7 @@ class Task:
     demonstration: str | Path = ""
     skill: Any = None
     grasps: Mapping[str, tuple[Pose, ...]] = field(default_factory=dict)
+    passes: Mapping[str, tuple[At, ...]] = field(default_factory=dict)
     apart: float = 0.02
     seconds: float = 60.0
     script: Callable[[dict[str, np.ndarray]], Iterable[Any]] | None = None
@@ -134,6 +137,7 @@ class Task:
         objects = [each.name for each in self.objects]
         self._check_known("goals", self.goals, objects)
         self._check_known("grasps", self.grasps, objects)
+        self._check_known("passes", self.passes, [name for name in objects if name in self.goals])
         self._check_known("success.tolerances", self.success.tolerances, objects)
         for name in self.success.tolerances:
             if name not in self.goals:
@@ -175,14 +179,12 @@ class Task:
     def _check_goals(self) -> None:
         for name, where in self.goals.items():
             if isinstance(where, At):
-                if where.thing not in self.names:
-                    raise self.bad("goals", f"{name!r} refers to {where.thing!r}, which is not in the task; it has "
-                                   f"{', '.join(self.names)}")  # fmt: skip
-                if where.thing == name:
-                    raise self.bad("goals", f"{name!r} refers to itself")
-                rotation = np.asarray(where.rotation, dtype=np.float64)
-                if rotation.shape != (4,) or not math.isclose(float(np.linalg.norm(rotation)), 1.0, abs_tol=1e-3):
-                    raise self.bad("goals", f"the rotation of {name!r} is no unit quaternion wxyz")
+                self._check_place("goals", name, where)
+        for name, places in self.passes.items():
+            if not isinstance(places, tuple | list) or not all(isinstance(each, At) for each in places):
+                raise self.bad("passes", f"of {name!r} are {places!r}; expected (At(…), …)")
+            for each in places:
+                self._check_place("passes", name, each)
         for name in self.goals:
             _ = self._chain(name)
         if not self.goals and self.success.also is None:
@@ -192,6 +194,16 @@ class Task:
                 _ = each.body
             except OneDemoError as error:
                 raise self.bad("objects", f"{each.name!r}: {error}") from None
+
+    def _check_place(self, key: str, name: str, where: At) -> None:
+        if where.thing not in self.names:
+            reason = f"refers to {where.thing!r}, which is not in the task; it has {', '.join(self.names)}"
+            raise self.bad(key, f"{name!r} {reason}")
+        if where.thing == name:
+            raise self.bad(key, f"{name!r} refers to itself")
+        rotation = np.asarray(where.rotation, dtype=np.float64)
+        if rotation.shape != (4,) or not math.isclose(float(np.linalg.norm(rotation)), 1.0, abs_tol=1e-3):
+            raise self.bad(key, f"the rotation of {name!r} is no unit quaternion wxyz")
 
     def _chain(self, name: str) -> list[str]:
         """Return the things that a goal refers to, one through the other; refuse a circle."""

@@ -181,8 +181,9 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
             shape = self.task.objects[thing].shape
             holds = self.declared.grasps.get(name)
             grasp = pose @ holds[0] if holds else grasp_from_above(corners_at(shape, pose))
-            there = Pose.from_vector(goal) @ pose.inverse() @ grasp
-            motions.append(carry_motion(shape, pose, grasp, there))
+            held = pose.inverse() @ grasp
+            passing = [place @ held for place in self._arrangement.passed(name, start.objects, start.furniture)]
+            motions.append(carry_motion(shape, pose, grasp, Pose.from_vector(goal) @ held, passing))
         if not motions:
             poses = zip(self.task.objects, start.objects, strict=True)
             motions = [reach_motion(home, corners_at(each.shape, Pose.from_vector(row))) for each, row in poses]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -13,9 +14,12 @@ from gymnasium.utils.env_checker import check_env
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs import At, Fixture, Movable, Range, Success, Task, Tolerance, register_task
+from onedemo.envs.scene.body_clearance import point_clearance
 from onedemo.envs.scene.scene import ARM, FINGERS, FIRST_OBJECT, FURNITURE, OBSTACLE, WORLD
 from onedemo.envs.tasks.judge import angle_between, is_unwanted, offsets
-from onedemo.planner import Box, Cylinder, Pose
+from onedemo.planner import Box, Cylinder, Obstacle, Pose
+from onedemo.planner.geometry.hulls import corner_points
+from onedemo.planner.geometry.shapes import pack
 
 
 def fell(scene) -> bool:
@@ -103,6 +107,28 @@ def test_things_are_moved_as_far_as_their_ranges_say(env, level, far):
 def test_obstacles_leave_room(env, level):
     _, info = env.reset(seed=1, options={"level": level})
     assert math.isfinite(info["min_obstacle_distance"]) and info["min_obstacle_distance"] > 0.02
+
+
+@pytest.mark.parametrize("level", ["L3", "L4"])
+def test_obstacles_leave_room_where_an_object_must_pass(level):
+    """As a sponge does along a board: whatever the hand does there, the place and what is above it are clear."""
+    end, other = At("pad", (0, 0.10, 0.035)), At("pad", (0, -0.06, 0.035))
+    declared = replace(CUP_ON_PAD, name="cup_along", goals={"cup": end}, passes={"cup": (other,)}, success=Success())
+    env, found = gym.make(register_task(declared)).unwrapped, 0
+    for seed in range(12):
+        observation, _ = env.reset(seed=seed, options={"level": level})
+        pad = Pose.from_vector(observation["furniture_pose"][0])
+        places = pack([each for when in np.linspace(0, 6, 25) for each in obstacles_at(env, when)])
+        for there in (end, other):
+            corners = corner_points(Cylinder(0.02, 0.06)) + (pad @ Pose.from_position_quaternion(there.at)).position
+            assert min(point_clearance(corner, places) for corner in corners) > 0.015
+        found += len(places.rows)
+    assert found > 100
+
+
+def obstacles_at(env, time: float) -> list[Obstacle]:
+    """The obstacles of the episode at a time since its start, or since they appeared."""
+    return [Obstacle(each.shape, each.pose(time)) for each in env.sim.obstacles.scheduled_obstacles]
 
 
 def put(env, cup, cube) -> dict:
