@@ -36,7 +36,8 @@ def own_policy(name: str, task: TaskDescription, demonstration: Demonstration, s
         BadConfig: no such module or name, or the result is no policy.
     """
     try:
-        make = imported(name, FORM)
+        module = name.partition(":")[0]
+        make = imported(name, FORM, lambda found: callable(found) and found.__module__ == module)
     except BadDottedName as error:
         raise BadConfig("method", name, error.reason) from error
     if not callable(make):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -210,7 +210,7 @@ def _cells(
         for default in settings.defaults:
             if _matches(values, default.when):
                 weak = merged(weak, default.set)
-        cell = _cell(merged(weak, values), chosen, path, changed)
+        cell = _cell(merged(weak, values), chosen, path, changed, settings.defaults)
         if cell.digest() in cells:
             raise BadConfig(path, "sweep", f"gives the same cell twice: {_combination(chosen)}")
         cells[cell.digest()] = cell
@@ -222,19 +222,29 @@ def _cells(
     return tuple(cells.values())
 
 
-def _cell(values: dict[str, Any], chosen: dict[str, Any], path: str | Path, changed: tuple[str, ...]) -> RunConfig:
+def _cell(
+    values: dict[str, Any],
+    chosen: dict[str, Any],
+    path: str | Path,
+    changed: tuple[str, ...],
+    defaults: Sequence[Default],
+) -> RunConfig:
     try:
         return RunConfig.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         cell = f" (in the cell {_combination(chosen)})" if chosen else ""
-        reason = reason_of(first, ALLOWED) + cell + _advice(key, first, values)
+        reason = reason_of(first, ALLOWED) + cell + _advice(key, first, values, defaults)
         raise BadConfig(_blame(path, changed, key), key, reason) from None
 
 
-def _advice(key: str, error: Any, values: Mapping[str, Any]) -> str:
+def _advice(key: str, error: Any, values: Mapping[str, Any], defaults: Sequence[Default]) -> str:
     """Return what to write instead, where that can be said; else ""."""
+    if error["type"] == "missing":
+        conditions = [default.when for default in defaults if key in default.set]
+        if conditions:
+            return f"; {_conditions(conditions, values)}"
     if error["type"] == "missing" and key == "demonstration":
         known = shipped_demonstrations()
         name = values.get("task") if values.get("task") in known else known[0]
@@ -242,6 +252,16 @@ def _advice(key: str, error: Any, values: Mapping[str, Any]) -> str:
     if isinstance(error["input"], list) and key in CELL_KEYS and key not in FIXED:
         return f"; to run each of several, write 'sweep.{key}=[...]', in a file sweep: {{{key}: [...]}}"
     return ""
+
+
+def _conditions(conditions: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> str:
+    """Return with which values a config sets what is missing, and what the cell has instead."""
+    said = []
+    for key in dict.fromkeys(key for condition in conditions for key in condition):
+        wanted = [condition[key] for condition in conditions if key in condition]
+        known = [each for value in wanted for each in (value if isinstance(value, list) else [value])]
+        said.append(f"{key}={at(values, key)} is none of {', '.join(map(str, dict.fromkeys(known)))}")
+    return f"the config sets it for some cells, and here {' or '.join(said)}"
 
 
 def _matches(values: Mapping[str, Any], condition: Mapping[str, Any]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ def is_dotted(name: object) -> bool:
     return isinstance(name, str) and ":" in name
 
 
-def imported(path: str, form: str) -> Any:
+def imported(path: str, form: str, wanted: Callable[[Any], bool]) -> Any:
     """Import the object that a dotted path names; importing its module runs its code.
 
     The module is searched on Python's path and in the current folder.
@@ -31,6 +32,7 @@ def imported(path: str, form: str) -> Any:
     Args:
         path: dotted path.
         form: how such a path looks, for the message.
+        wanted: whether an object is of the kind that is looked for, for the message; the object itself is not checked.
 
     Raises:
         BadDottedName: no such module or name.
@@ -49,8 +51,8 @@ def imported(path: str, form: str) -> Any:
     finally:
         sys.path.remove(here)
     if not hasattr(found, attribute):
-        known = ", ".join(key for key in vars(found) if not key.startswith("_")) or "nothing"
-        raise BadDottedName(path, f"{module} has no {attribute!r}; it has: {known}")
+        known = ", ".join(key for key, value in vars(found).items() if not key.startswith("_") and wanted(value))
+        raise BadDottedName(path, f"{module} has no {attribute!r}; of this kind it has: {known or 'nothing'}")
     return getattr(found, attribute)
 
 

@@ -77,11 +77,16 @@ def config_path(config: str) -> Path:
 
     Raises:
         BadConfig: no such file.
+        UnknownName: no such config is shipped.
     """
     path = Path(config)
+    if path.suffix == ".py":
+        raise BadConfig(config, "", f"is no config; a task in it is {path.stem}:NAME")
     if path.exists():
         return path
     if path.suffix in ("", ".yaml") and str(path.parent) in SHIPPED_FOLDERS:
+        if path.with_suffix(".py").is_file():
+            raise BadConfig(config, "", f"no such config; a task in {path.stem}.py is {path.stem}:NAME")
         return shipped_config(path.stem)
     raise BadConfig(path, "", "no such file")
 

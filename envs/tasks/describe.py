@@ -7,9 +7,14 @@ import math
 import numpy as np
 
 from ...planner.geometry.hulls import corner_points
+from ..scene.robots import ROBOTS
 from ..scene.scene_objects import FixedShape
 from .places import At, Range
 from .task import Task
+
+YAWS = np.arange(36) * np.pi / 36.0
+ACROSS = np.array([np.cos(YAWS), np.sin(YAWS), np.zeros(len(YAWS))])
+"""Directions (3, n) across which fingers that come from above may close."""
 
 
 def described(task: Task) -> str:
@@ -19,13 +24,28 @@ def described(task: Task) -> str:
     rows += [("fixture", each.name, each.furniture.parts) for each in task.fixtures]
     things += "\n".join(_row(kind, name, parts, task.start[name]) for kind, name, parts in rows)
     goals = [f"- {_goal(task, name)}" for name in task.goals]
-    return "\n\n".join([f"# {task.id}", task.summary, things, "Done when, as the simulator shows it:",
-                        "\n".join([*goals, *_conditions(task)])])  # fmt: skip
+    done = "\n".join([*goals, *_conditions(task)])
+    parts = [f"# {task.id}", task.summary, things, *_wide(task), "Done when, as the simulator shows it:", done]
+    return "\n\n".join(parts)
+
+
+def _wide(task: Task) -> list[str]:
+    """Return a sentence on each object that a hand cannot close around from above."""
+    opening, found = ROBOTS["Panda"].opening, []
+    for each in task.objects:
+        narrowest = min(np.ptp(_corners(each.body.parts) @ ACROSS, axis=0))
+        if narrowest > opening:
+            size = f"{1e3 * narrowest:.0f} mm wide where it is narrowest"
+            found.append(f"{each.name} is {size}; a Panda's hand opens to {1e3 * opening:.0f} mm.")
+    return found
+
+
+def _corners(parts: tuple[FixedShape, ...]) -> np.ndarray:
+    return np.vstack([corner_points(part.shape) @ part.pose.rotation.T + part.pose.position for part in parts])
 
 
 def _row(kind: str, name: str, parts: tuple[FixedShape, ...], where: Range) -> str:
-    corners = np.vstack([corner_points(part.shape) @ part.pose.rotation.T + part.pose.position for part in parts])
-    size = " x ".join(f"{1e3 * value:.0f}" for value in np.ptp(corners, axis=0))
+    size = " x ".join(f"{1e3 * value:.0f}" for value in np.ptp(_corners(parts), axis=0))
     place = f"{where.place[0]:g}, {where.place[1]:g}"
     return f"| {name} | {kind} | {len(parts)} | {size} | {place} | {_moved(where, 'L1')} | {_moved(where, 'L2')} |"
 

@@ -59,7 +59,7 @@ def task_at(path: str) -> Task:
         BadDottedName: no such module or name, or it is no task.
         BadTask: the task cannot be used, or its name is registered already.
     """
-    found = imported(path, FORM)
+    found = imported(path, FORM, lambda found: isinstance(found, Task))
     if not isinstance(found, Task):
         raise BadDottedName(path, f"is a {type(found).__name__}, not a Task: write {path.partition(':')[2]} = Task(…)")
     _registered(found, _file_of(path))

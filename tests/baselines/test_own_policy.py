@@ -87,7 +87,7 @@ def test_the_command_takes_it(monkeypatch, capsys):
     with pytest.raises(SystemExit) as stopped:
         main()
     assert stopped.value.code == 2
-    assert "my_policies has no 'Below'; it has: " in " ".join(capsys.readouterr().err.split())
+    assert "my_policies has no 'Below'; of this kind it has: " in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize("change", ["level=T", "tool=[0, 0, 0.1, 0]"])

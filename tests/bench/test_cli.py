@@ -99,6 +99,8 @@ def test_names_in_a_file_are_never_taken_for_markup(monkeypatch, capsys, tmp_pat
         (["reproduce", "--episodes", "0"], "--episodes"),
         (["run", "nothing"], "unknown config 'nothing'; known: bimanual_pour, compare, headline, "),
         (["run", "none.yaml"], "unknown config 'none'; known: bimanual_pour, compare, headline, "),
+        (["run", "robosuite", "env.task=Lifft"], "and here env.task=Lifft is none of Lift, Stack, NutAssemblySquare"),
+        (["run", "mine.py"], "mine.py: is no config; a task in it is mine:NAME"),
         (["run", "some/none.yaml"], "some/none.yaml: no such file"),
         (["run", "stack", "episods=3"], "command line: episods: unknown key; did you mean 'episodes'?"),
         (["run", "stack", "task=juggle"], "task: unknown task 'juggle'; known: stack, pour"),

@@ -13,6 +13,7 @@ from onedemo.bench.cli import main
 from onedemo.envs import At, Fixture, Movable, Part, Range, Success, Task, Tolerance, register_task, task_at
 from onedemo.envs.dotted_names import BadDottedName
 from onedemo.envs.errors import BadTask
+from onedemo.envs.tasks.describe import described
 from onedemo.planner import Box, Cylinder, Mesh, Pose
 from onedemo.planner.errors import BadOption, OneDemoError
 
@@ -166,7 +167,7 @@ def module(tmp_path, monkeypatch):
         ("my_tasks:", "is not of the form my_tasks:MY_TASK"),
         ("../my_tasks:CUBE", "is not of the form"),
         ("nowhere:CUBE", "importing nowhere: ModuleNotFoundError: No module named 'nowhere'"),
-        ("my_tasks:PEG", "my_tasks has no 'PEG'; it has: .*CUBE"),
+        ("my_tasks:PEG", "my_tasks has no 'PEG'; of this kind it has: CUBE"),
         ("my_tasks:NUMBER", "is a int, not a Task: write NUMBER = Task"),
     ],
 )
@@ -194,6 +195,18 @@ def test_a_task_without_a_demonstration_says_how_to_get_one(module, monkeypatch,
     assert "demonstration: is not named; record one with 'onedemo demo record my_tasks:CUBE -o FILE.npz'" in said
     said = said_by(monkeypatch, capsys, "demo", "record", "my_tasks:CUBE", "-o", "cube.npz")
     assert "script: is not given" in said
+
+
+def test_the_name_of_a_file_alone_is_told_how_to_name_a_task_in_it(module, monkeypatch, capsys):
+    assert "a task in my_tasks.py is my_tasks:NAME" in said_by(monkeypatch, capsys, "run", "my_tasks")
+
+
+def test_the_page_says_which_object_is_wider_than_a_hand():
+    box, post = Movable("crate", Box((0.12, 0.10, 0.05))), Movable("post", Box((0.06, 0.20, 0.05)))
+    start = {"crate": Range((0, -0.2)), "post": Range((0, 0)), "pad": PLACES["pad"]}
+    page = described(task(objects=(box, post), start=start, goals={"post": At("pad")}))
+    assert "crate is 100 mm wide where it is narrowest; a Panda's hand opens to 79 mm." in page
+    assert "post is 6" not in page
 
 
 def test_a_demonstration_that_shows_no_skill_says_what_is_missing(module, monkeypatch, capsys):
