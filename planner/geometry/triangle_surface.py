@@ -91,12 +91,14 @@ def shells_of(triangles: np.ndarray) -> list[np.ndarray]:
 
     Solids that overlap are such parts, and so are the outer and the inner side of a hollow one.
     """
-    from scipy.sparse import coo_array
+    from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
     corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
-    count, ends = int(corners.max()) + 1, np.vstack([corners[:, :2], corners[:, 1:]])
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    # with indices of 64 bits an old SciPy leaves all labels 0, and says so on the console only
+    count, ends = int(corners.max()) + 1, np.vstack([corners[:, :2], corners[:, 1:]]).astype(np.int32)
+    graph = csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    graph.indices, graph.indptr = graph.indices.astype(np.int32), graph.indptr.astype(np.int32)
     labels = connected_components(graph, directed=False)[1][corners[:, 0]]
     order = np.argsort(labels, kind="stable")
     return np.split(triangles[order], np.flatnonzero(np.diff(labels[order])) + 1)

@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 import weakref
+from functools import partial
 
 import cloudpickle
 import gymnasium as gym
@@ -255,7 +256,8 @@ def test_wrapped_further_and_in_vectors_deep_copies_are_twins():
     twin = copy.deepcopy(flat)
     action = np.full(8, 0.5)
     assert_same(flat.step(action), twin.step(action))
-    envs = gym.make_vec("onedemo/Reach-v0", num_envs=2)
+    # the first Gymnasium's make_vec keeps a generator, which nothing copies
+    envs = gym.vector.SyncVectorEnv([partial(gym.make, "onedemo/Reach-v0")] * 2)
     envs.reset(seed=1)
     twins = copy.deepcopy(envs)
     actions = np.full(envs.action_space.shape, 0.5)
