@@ -10,32 +10,19 @@ import numpy as np
 from ..envs import TaskDescription
 from ..planner import Demonstration, MotionSettings, Pose
 from ..planner.errors import BadOption, PlanFailed
+from ..planner.skills.skill import SegmentedSkill
 from .motion.settings import ProgramSettings
 from .motion.tool_frame import ToolFrameMotion
 from .policy import EpisodePolicy, Observation, PolicyReport
 from .programs.arm_executor import ArmExecutor
 from .programs.bimanual_pour import BimanualPourProgram
 from .programs.dual_arm_executor import DualArmExecutor
-from .programs.pour import PourProgram
-from .programs.reach import ReachProgram
-from .programs.shelve import ShelveProgram
+from .programs.segment_skills import skill_of_segments
 from .programs.skill_program import SkillProgram
-from .programs.stack import StackProgram
 from .programs.task_skills import skill_of
 from .programs.world_model import WorldModel
 
-Program = StackProgram | PourProgram | ShelveProgram | BimanualPourProgram | ReachProgram | SkillProgram
-PROGRAMS = {
-    "stack": StackProgram,
-    "pour": PourProgram,
-    "shelve": ShelveProgram,
-    "bimanual_pour": BimanualPourProgram,
-    "reach": ReachProgram,
-    "place_one": StackProgram,
-    "tilt_pour": PourProgram,
-    "insert_one": ShelveProgram,
-}
-"""Programs written for a task; in any other one, the program is found in the demonstration."""
+Program = BimanualPourProgram | SkillProgram
 CONTROL_MODE = "joint_velocity"
 
 
@@ -80,8 +67,8 @@ class ProgramPolicy(EpisodePolicy):
         tool: `tcp_from_tool` of another frame of the hand, whose motion is planned; None: the tcp.
 
     Raises:
-        BadDemonstration, UnknownName: no program was written for the task, and none is found in the demonstration; see
-            `skill_of`.
+        BadDemonstration, UnknownName: the task does not say what the segments of its demonstration mean, and no skill
+            is found in it; see `skill_of`.
         BadOption: another control mode or time step.
     """
 
@@ -93,7 +80,7 @@ class ProgramPolicy(EpisodePolicy):
             raise BadOption("control_mode", f"{reason} control_mode={CONTROL_MODE!r}")
         self.settings = settings = at_rate(settings, task.control_dt)
         self.task, self.demonstration = settings.visible_part(task), demonstration
-        self.skill = None if task.name in PROGRAMS else task.skill or skill_of(demonstration, task)
+        self.skill = task.skill or skill_of(demonstration, task)
         self.motion_method = settings.motion_method if tool is None else ToolFrameMotion(settings.motion_method, tool)
 
     def begin(self, observation: Observation) -> Episode:
@@ -110,9 +97,10 @@ class ProgramPolicy(EpisodePolicy):
             observation,
             motion_method=self.motion_method,
         )
-        if self.skill is not None:
-            return Episode(hand, SkillProgram(task, self.skill, settings, hand))
-        return Episode(hand, PROGRAMS[task.name](task, self.demonstration, settings, hand))
+        skill = self.skill
+        if isinstance(skill, SegmentedSkill):
+            skill = skill_of_segments(skill, self.demonstration, task, settings, observation)
+        return Episode(hand, SkillProgram(task, skill, settings, hand))
 
     def act(self, observation: Observation, memory: Episode) -> np.ndarray:
         """Return the next action of the program; stand still once it has finished or failed.

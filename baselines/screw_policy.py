@@ -8,9 +8,7 @@ from ..envs import TaskDescription
 from ..planner import Demonstration, PlanSettings, Pose, RepetSettings
 from .motion.motion_method import SCREW, MotionMethod
 from .motion.settings import ProgramSettings
-from .program_policy import PROGRAMS, ProgramPolicy
-
-__all__ = ["PROGRAMS", "ScrewPolicy", "ScrewSettings"]
+from .program_policy import ProgramPolicy
 
 
 @dataclass(frozen=True, slots=True)

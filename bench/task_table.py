@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from ..envs import IDS
 from ..envs.dotted_names import is_dotted
 from ..envs.pour.geometry import TARGET
+from ..envs.pour.skill import BIMANUAL_SKILL, POUR_SKILL
+from ..envs.shelve.skill import SHELVE_SKILL
+from ..envs.stack.skill import REACH_SKILL, STACK_SKILL
+from ..planner.skills.skill import SegmentedSkill
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,7 @@ class TaskFacts:
         poured_into: index of the target glass; None if nothing is poured.
         upright: True if the carried object should stay upright.
         demonstrated_task: the task of its demonstration if that is another task; "" otherwise.
+        skill: what the segments of its demonstration mean; None: its demonstration needs no segments.
     """
 
     id: str
@@ -48,6 +53,7 @@ class TaskFacts:
     poured_into: int | None = None
     upright: bool = True
     demonstrated_task: str = ""
+    skill: SegmentedSkill | None = None
 
 
 OUTSIDE = Error("fraction_outside", "largest share of beads outside", "%", 1e2)
@@ -55,18 +61,28 @@ OFFSET = Error("position_error", "largest position error", "mm", 1e3)
 BEADS = {"beads_lost": "beads_lost", "share_outside": "fraction_outside"}
 TASKS = {
     "stack": TaskFacts(
-        "onedemo/Stack-v0", OFFSET, {"stack_offset": "position_error", "stack_yaw": "yaw_error"}, "transfer"
+        "onedemo/Stack-v0",
+        OFFSET,
+        {"stack_offset": "position_error", "stack_yaw": "yaw_error"},
+        "transfer",
+        skill=STACK_SKILL,
     ),
-    "pour": TaskFacts("onedemo/Pour-v0", OUTSIDE, BEADS, "carry", TARGET),
+    "pour": TaskFacts("onedemo/Pour-v0", OUTSIDE, BEADS, "carry", TARGET, skill=POUR_SKILL),
     "shelve": TaskFacts(
         "onedemo/Shelve-v0",
         OFFSET,
         {"insertion_offset": "position_error", "insertion_angle": "angle_error"},
         "insert",
         upright=False,
+        skill=SHELVE_SKILL,
     ),
     "reach": TaskFacts(
-        "onedemo/Reach-v0", OFFSET, {"reach_offset": "position_error"}, upright=False, demonstrated_task="stack"
+        "onedemo/Reach-v0",
+        OFFSET,
+        {"reach_offset": "position_error"},
+        upright=False,
+        demonstrated_task="stack",
+        skill=REACH_SKILL,
     ),
     "place_one": TaskFacts(
         "onedemo/PlaceOne-v0",
@@ -74,8 +90,11 @@ TASKS = {
         {"stack_offset": "position_error", "stack_yaw": "yaw_error"},
         "transfer",
         demonstrated_task="stack",
+        skill=STACK_SKILL,
     ),
-    "tilt_pour": TaskFacts("onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, demonstrated_task="pour"),
+    "tilt_pour": TaskFacts(
+        "onedemo/TiltPour-v0", OUTSIDE, BEADS, "carry", TARGET, demonstrated_task="pour", skill=POUR_SKILL
+    ),
     "insert_one": TaskFacts(
         "onedemo/InsertOne-v0",
         OFFSET,
@@ -83,8 +102,11 @@ TASKS = {
         "insert",
         upright=False,
         demonstrated_task="shelve",
+        skill=SHELVE_SKILL,
     ),
-    "bimanual_pour": TaskFacts("onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, demonstrated_task="pour"),
+    "bimanual_pour": TaskFacts(
+        "onedemo/BimanualPour-v0", OUTSIDE, BEADS, poured_into=TARGET, demonstrated_task="pour", skill=BIMANUAL_SKILL
+    ),
     "robosuite": TaskFacts("onedemo/Robosuite-v0", None, {}, upright=False),
 }
 """All shipped tasks by name; for "robosuite" see also `FAMILIES` of `configs.run_config`."""

@@ -46,7 +46,8 @@ ENVS_MAY_USE = {
     "planner.fitting",
 }
 ENVS_MAY_USE |= {"planner.collision.proximity", "planner.control.inverse_kinematics", "planner.control.linear"}
-"""Geometry and kinematics of the planner, no method."""
+ENVS_MAY_USE |= {"planner.skills.skill"}
+"""Geometry and kinematics of the planner, and the form of a skill, no method."""
 SIMULATORS = {"mujoco", "robosuite", "gymnasium"}
 READERS = {"planner/models/urdf_model.py", "planner/judge/geometry.py"}
 USERS = {

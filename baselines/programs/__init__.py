@@ -1,1 +1,1 @@
-"""Task programs: the sequence of motions each task requires."""
+"""The program that does a skill in the scene at hand, and that of pouring with two hands."""

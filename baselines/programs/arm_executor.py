@@ -16,6 +16,7 @@ from ...planner import (
     NextMotion,
     Obstacle,
     Plan,
+    Planner,
     Pose,
     PosePath,
     ReactiveSettings,
@@ -23,6 +24,7 @@ from ...planner import (
     final_path,
 )
 from ...planner.errors import PlanFailed
+from ...planner.geometry.shapes import moves
 from ...planner.reactive.command import DONE, ESCAPING, FAILED
 from ...planner.robot.joint_limits import near_limit
 from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
@@ -90,6 +92,7 @@ class ArmExecutor:
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
         self._held: _Held | None = None
+        self._pace = 1.0
         self.drawn: list[LabeledPath] = []
         self._escape: list[np.ndarray] = []
         self.motion_method, self._planner = motion_method, motion_method.follower(arm, body, settings)
@@ -109,6 +112,9 @@ class ArmExecutor:
 
     def slow_down(self, pace: float) -> None:
         """Limit the joints to a fraction of their speed limits from now on; only between motions."""
+        if pace == self._pace:
+            return
+        self._pace = pace
         self.arm = replace(self.arm, velocity_limits=pace * self._full)
         self._planner = self.motion_method.follower(self.arm, self._planner.body, self._planner.settings)
 
@@ -176,6 +182,14 @@ class ArmExecutor:
         plan = plan if search else replace(plan, search=None)
         return choose(self.arm, plan, self.q, motion, then, self.motion_method)
 
+    def is_clear(self, motion: MotionChoice) -> bool:
+        """Return whether the arm touches nothing, where it is, that it must not touch in a motion."""
+        plan, here = self._planner.settings.plan, self.arm.fk(self.q)
+        still = [each for each in motion.obstacles if not moves(each)]
+        planner = Planner(self.arm, motion.body, replace(plan, search=None, avoid=False))
+        found = planner.plan(PosePath(np.array([here.dq, here.dq])), self.q, here, still, allowed=motion.allowed)
+        return found.reason != "start in collision"
+
     def departure_path(self, motion: MotionChoice) -> PosePath | None:
         """Return the departure of a motion from here; see `goal_choice.departure_path`."""
         return departure_path(self.arm, self._planner.settings.plan, self.q, motion)
@@ -185,7 +199,8 @@ class ArmExecutor:
         *before, (last, exact) = choice.parts
         for path, to_its_end in before:
             yield from self.follow(path, exact=to_its_end)
-        yield from self.follow(last, exact=exact, next_motion=choice.next_motion, plan=choice.plan)
+        keep = choice.motion is not None and choice.motion.must_keep
+        yield from self.follow(last, exact=exact, next_motion=choice.next_motion, plan=choice.plan, must_keep=keep)
 
     def follow(
         self,
@@ -243,11 +258,10 @@ class ArmExecutor:
         Raises:
             PlanFailed: as `follow`.
         """
-        away = np.linalg.norm(path.positions - path.positions[0], axis=1) > distance
-        free = int(np.argmax(away)) if away.any() else len(path) - 1
-        yield from self.follow(path[: free + 1], exact=False, detours=False)
-        if free < len(path) - 1:
-            yield from self.follow(path[free:], exact=False)
+        near, rest = parted(path, distance)
+        yield from self.follow(near, exact=False, detours=False)
+        if rest is not None:
+            yield from self.follow(rest, exact=False)
 
     def _note_escape(self, command: Command, led: bool) -> None:
         if command.state == ESCAPING or (led and command.state not in (DONE, FAILED)):
@@ -297,3 +311,15 @@ class ArmExecutor:
         normalized = np.clip(speeds / self._full, -1.0, 1.0)
         self.q = self.q + self.settings.dt * normalized * self._full
         return np.append(normalized, self._gripper)
+
+
+def parted(path: PosePath, distance: float) -> tuple[PosePath, PosePath | None]:
+    """Return the part of a path that is near its beginning, and the rest, if there is one.
+
+    Args:
+        path: the path.
+        distance: distance [m] from the beginning.
+    """
+    away = np.linalg.norm(path.positions - path.positions[0], axis=1) > distance
+    free = int(np.argmax(away)) if away.any() else len(path) - 1
+    return path[: free + 1], path[free:] if free < len(path) - 1 else None

@@ -21,9 +21,10 @@ from ...planner.geometry import dualquat as dq
 from ...planner.imitation.bimanual import shared_translation
 from ...planner.imitation.segmentation import resampled
 from ...planner.robot.kinematics import CHAIN
+from ...planner.skills.alike import standing
+from ...planner.skills.segments import RIM, anchored, lip_of
 from ..policy import LabeledPath
 from .dual_arm_executor import DualArmExecutor, DualArmRollOut, Paths
-from .pour_goals import Size, lip, lip_direction, standing
 
 if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings
@@ -70,28 +71,21 @@ class BimanualPourProgram:
         hands: executor of both arms.
     """
 
-    SEGMENTS = ("approach", "carry", "return")
-    """Segments required of a demonstration of this task."""
-    SIZED: tuple[str, ...] = ("source", "target")
-    """Objects whose sizes a demonstration must give."""
-    RELEASE = ""
-    """Segment after which the recorded gripper decides how far this one opens; "" for none."""
-
     def __init__(self, task: TaskDescription, shown: Demonstration, settings: ProgramSettings, hands: DualArmExecutor):
         self.task, self.settings, self.hands = task, settings, hands
-        self._sizes = [Size.of(each.size) for each in task.objects]
+        self._sizes = [each.size for each in task.objects]
         self._read(shown)
         self.paths = [LabeledPath("demonstrated", "carry", shown.segment_path("carry"))]
 
     def _read(self, shown: Demonstration) -> None:
         """Read the relative paths rim_from_lip of the demonstration."""
-        sizes = [Size.of(shown.object_sizes[each.name]) for each in self.task.objects]
+        sizes = [shown.object_sizes[each.name] for each in self.task.objects]
         source = standing(shown.segment("approach").reference_pose)
         held = shown.segment_path("approach")[-1].inverse() @ source
-        self._direction = lip_direction(shown.segment_path("carry")[-1] @ held)
-        tool = held @ lip(sizes[SOURCE], self._direction)
-        rim = standing(shown.segment("carry").reference_pose) @ _top(sizes[TARGET])
-        shift = Pose.from_position_quaternion([*(FURTHER * self._direction), -LOWER])
+        self._lip = lip_of(shown.segment_path("carry")[-1] @ held)
+        tool = held @ anchored(self._lip, sizes[SOURCE])
+        rim = standing(shown.segment("carry").reference_pose) @ anchored(RIM, sizes[TARGET])
+        shift = Pose.from_position_quaternion([*(FURTHER * np.array(self._lip[:2])), -LOWER])
         step = self.settings.resample
         self._carry, self._return = (
             resampled(shown.segment_path(name), step).moved(rim.inverse()).with_tool(tool).moved(shift)
@@ -141,12 +135,12 @@ class BimanualPourProgram:
             holder: direction of the left hand [rad].
         """
         shoulders = np.mean([arm.chain[0, CHAIN.offset : CHAIN.kind] for arm in self.task.arms], axis=0)
-        shown_yaw = float(np.arctan2(self._direction[1], self._direction[0]))
+        shown_yaw = float(np.arctan2(self._lip[1], self._lip[0]))
         turn = pour - shown_yaw
         world_from_rim = Pose.from_yaw(shoulders + place, turn)
         # the round glasses, turned in the hands so that the hands point in their directions
-        tool = _turned(held[SOURCE], turn, pourer) @ lip(self._sizes[SOURCE], self._direction)
-        hold = _turned(held[TARGET], turn, holder) @ _top(self._sizes[TARGET])
+        tool = _turned(held[SOURCE], turn, pourer) @ anchored(self._lip, self._sizes[SOURCE])
+        hold = _turned(held[TARGET], turn, holder) @ anchored(RIM, self._sizes[TARGET])
         right, left = (arm.fk(q) for arm, q in zip(self.task.arms, self.hands.q, strict=True))
         now = (left @ hold).inverse() @ right @ tool
         relative, tail = self.hands.motion_method.relative(self._carry, now)
@@ -161,10 +155,6 @@ class BimanualPourProgram:
             (lips.with_tool(from_lip), rims.with_tool(from_rim)),
             (_composed(still, back).with_tool(from_lip), still.with_tool(from_rim)),
         )
-
-
-def _top(size: Size) -> Pose:
-    return Pose.from_position_quaternion([0.0, 0.0, 0.5 * size.height])
 
 
 def _turned(held: Pose, glass: float, hand: float) -> Pose:

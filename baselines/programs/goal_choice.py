@@ -8,8 +8,9 @@ followed by the next motion from its end. Not in the paper, which has one goal.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from ...planner.geometry.shapes import moves
 from ...planner.imitation.tsia import departure, screw_path
 from ...planner.planning.joint_space_motion import MAX_DEVIATION
 from ..motion.motion_method import DIRECT, ESCAPE, MADE, SCREW, MotionMethod
+from .world_model import OBJECT_MARGIN
 
 
 class MotionChoice(NamedTuple):
@@ -47,6 +49,15 @@ class MotionChoice(NamedTuple):
         leaving: the segment whose beginning is imitated at the departure; None: no departure, blend at once.
         detours: False: along the path or not at all, see `ReactivePlanner.go`.
         done: index in `demonstrated` up to which a departure, present or past, has executed it.
+        then: returns the next motion by the index of the goal; None if there is none.
+        guided: False: imitated from its first pose on, as what continues a motion.
+        exact: False: finished as soon as the tool is within reach of the end.
+        must_keep: a plan that keeps nothing of the demonstration fails.
+        enough: what ends the search among the goals; None: all of them are compared.
+        searched: number of goals for which joint space is searched; None: all of them.
+        parts: number of motions, this one and those that follow, without which it is none.
+        clearance: margin [m] of objects while it is followed.
+        reaches: quick test whether the arm has a posture at a goal; goals without one are left out; None: no test.
     """
 
     name: str
@@ -58,6 +69,36 @@ class MotionChoice(NamedTuple):
     leaving: PosePath | None = None
     detours: bool = True
     done: int = 0
+    then: Callable[[int], MotionChoice] | None = None
+    guided: bool = True
+    exact: bool = True
+    must_keep: bool = False
+    enough: Enough | None = None
+    searched: int | None = None
+    parts: int = 1
+    clearance: float = OBJECT_MARGIN
+    reaches: Callable[[Pose], bool] | None = None
+
+    @property
+    def candidates(self) -> list[int]:
+        """Indices of the goals to try; the first one if the arm has a posture at none."""
+        return [k for k, goal in enumerate(self.goals) if self.reaches is None or self.reaches(goal)] or [0]
+
+
+class Enough(NamedTuple):
+    """Motions that are good enough to look no further.
+
+    Attributes:
+        margin: least distance of the joints to their limits [rad].
+        as_shown: whether a detour, or a way through joint space, is not good enough.
+    """
+
+    margin: float
+    as_shown: bool = False
+
+    def holds(self, choice: ChosenMotion) -> bool:
+        """Return whether a choice is good enough."""
+        return choice.margin >= self.margin and (choice.as_shown or not self.as_shown)
 
 
 class ChosenMotion(NamedTuple):
@@ -68,12 +109,43 @@ class ChosenMotion(NamedTuple):
         plan: plan to the goal.
         departure: path of the departure; None: no departure.
         then: the choice of the next motion from there; None if not requested or infeasible.
+        motion: the motion that was asked for; None: one to a single goal, exactly.
     """
 
     index: int
     plan: Plan
     departure: PosePath | None = None
     then: ChosenMotion | None = None
+    motion: MotionChoice | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of motions, one after the other, that arrive."""
+        return int(self.plan.success) + (0 if self.then is None else self.then.count)
+
+    @property
+    def complete(self) -> bool:
+        """True if all motions that were asked for arrive."""
+        if self.motion is None or self.motion.then is None:
+            return self.plan.success
+        return self.then is not None and self.then.complete
+
+    @property
+    def margin(self) -> float:
+        """Least distance of the joints to their limits [rad], of all motions."""
+        return self.plan.margin if self.then is None else min(self.plan.margin, self.then.margin)
+
+    @property
+    def share(self) -> float:
+        """Least share of a demonstration that is imitated, of all motions; rounded: a small detour is none."""
+        own = min(round(self.plan.imitated_share, 1), 1.0)
+        return own if self.then is None else min(own, self.then.share)
+
+    @property
+    def as_shown(self) -> bool:
+        """True if all motions lead to the demonstrated path, without a detour."""
+        made = self.plan.how in MADE and self.plan.imitated_share == 1.0
+        return (self.plan.how == DIRECT or made) and (self.then is None or self.then.as_shown)
 
     @property
     def tail(self) -> PosePath:
@@ -83,10 +155,11 @@ class ChosenMotion(NamedTuple):
     @property
     def parts(self) -> list[tuple[PosePath, bool]]:
         """Paths to follow one after the other, each with True if it is followed exactly to its end."""
+        exact = self.motion is None or self.motion.exact
         if self.plan.how == ESCAPE:
-            return [(self.plan.path, True)]
+            return [(self.plan.path, exact)]
         away = [] if self.departure is None or self.plan.how not in (DIRECT, *MADE) else [(self.departure, False)]
-        return [*away, (self.plan.path if self.plan.how in MADE else self.tail, True)]
+        return [*away, (self.plan.path if self.plan.how in MADE else self.tail, exact)]
 
     @property
     def path(self) -> PosePath:
@@ -132,13 +205,18 @@ def choose(
     Raises:
         PlanFailed: "blocked" or "ik_or_limit", no goal can be reached.
     """
+    if then is not None:
+        motion = motion._replace(then=then)
     quick = replace(settings, search=None)
-    best = max(_choices(motion_method, arm, quick, quick, q, motion, then), key=_rank)
-    if settings.search is not None and (not best.plan.success or (then is not None and best.then is None)):
-        best = max([best, *_choices(motion_method, arm, settings, quick, q, motion, then)], key=_rank)
+    best = _best(_choices(motion_method, arm, quick, q, motion), motion)
+    if settings.search is not None and not best.complete:
+        few = motion._replace(goals=motion.goals[: motion.searched])
+        best = _best(chain([best], _choices(motion_method, arm, settings, q, few)), motion)
     if not best.plan.success:
         reason = "ik_or_limit" if best.plan.reason == "ik_or_limit" else "blocked"
         raise PlanFailed(reason, f"no goal of {motion.name} can be reached along the demonstration: {best.plan.why}")
+    if best.count < motion.parts:
+        raise PlanFailed("ik_or_limit", f"no posture is found from which {motion.name} can be finished")
     return best
 
 
@@ -167,32 +245,31 @@ def departure_path(arm: Arm, settings: PlanSettings, q: np.ndarray, motion: Moti
 
 
 def _choices(
-    motion_method: MotionMethod,
-    arm: Arm,
-    settings: PlanSettings,
-    next_settings: PlanSettings,
-    q: np.ndarray,
-    motion: MotionChoice,
-    then: Callable[[int], MotionChoice] | None,
+    motion_method: MotionMethod, arm: Arm, settings: PlanSettings, q: np.ndarray, motion: MotionChoice
 ) -> Iterator[ChosenMotion]:
     """Yield a choice for every goal, each with the best choice of the next motion from there."""
+    quick = replace(settings, search=None)
     if not motion.detours:
-        settings = replace(
-            settings, avoid=False, max_deviation=MAX_DEVIATION, motion=replace(settings.motion, guide=0.0)
-        )
+        settings = replace(settings, avoid=False, max_deviation=MAX_DEVIATION)
+    if not (motion.detours and motion.guided):
+        settings = replace(settings, motion=replace(settings.motion, guide=0.0))
     planner, away = motion_method.planner(arm, motion.body, settings), departure_path(arm, settings, q, motion)
-    for index, goal in enumerate(motion.goals):
-        following = None if then is None else then(index)
-        next_motion = None if following is None else _beginning(following, goal, settings)
-        shown = motion.demonstrated[motion_method.skipped(motion.done) :]
+    for index in motion.candidates:
+        goal = motion.goals[index]
+        following = None if motion.then is None else motion.then(index)
         plan = planner.plan(
-            shown, q, goal, _still(motion), allowed=motion.allowed, leaving=away, next_motion=next_motion
+            motion.demonstrated[motion_method.skipped(motion.done) :],
+            q,
+            goal,
+            _still(motion),
+            allowed=motion.allowed,
+            leaving=away,
+            next_motion=None if following is None else _beginning(following, goal, settings),
+            must_keep=motion.must_keep,
         )
-        choice = ChosenMotion(index, plan, away)
+        choice = ChosenMotion(index, plan, away, motion=motion)
         if plan.success and following is not None:
-            best = max(
-                _choices(motion_method, arm, next_settings, next_settings, plan.joints[-1], following, None), key=_rank
-            )
+            best = _best(_choices(motion_method, arm, quick, plan.joints[-1], following), following)
             choice = choice._replace(then=best if best.plan.success else None)
         yield choice
 
@@ -206,11 +283,21 @@ def _beginning(motion: MotionChoice, start: Pose, settings: PlanSettings) -> Nex
     return NextMotion(departure(motion.leaving, start, settings.motion.departure))
 
 
-def _rank(choice: ChosenMotion) -> tuple[bool, bool, float, float, int]:
-    """Rank by arrival, then continuation, then fraction of the demonstration imitated, then joint margin."""
-    plans = [choice.plan] if choice.then is None else [choice.plan, choice.then.plan]
-    share, margin = (min(getattr(plan, name) for plan in plans) for name in ("imitated_share", "margin"))
-    return choice.plan.success, choice.then is not None, min(round(share, 1), 1.0), margin, -choice.index
+def _best(choices: Iterable[ChosenMotion], motion: MotionChoice) -> ChosenMotion:
+    """Return the best choice, or the first one that is good enough."""
+    found: list[ChosenMotion] = []
+    for choice in choices:
+        found.append(choice)
+        if motion.enough is not None and choice.complete and motion.enough.holds(choice):
+            return choice
+    return max(found, key=lambda choice: _rank(choice, motion.enough))
+
+
+def _rank(choice: ChosenMotion, enough: Enough | None) -> tuple[int, float, bool, float, int]:
+    """Rank by the motions that arrive, then by how much they are like the demonstration, then by joint margin."""
+    like = choice.share if enough is None else float(choice.as_shown)
+    least = -math.inf if enough is None else enough.margin
+    return choice.count, like, choice.margin >= least, choice.margin, -choice.index
 
 
 def _still(motion: MotionChoice) -> list[Obstacle]:

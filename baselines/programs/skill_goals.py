@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from ...envs import TaskDescription
-from ...planner import Pose
-from ...planner.skills.skill import Phase
+from ...planner import Pose, PosePath
+from ...planner.skills.segments import anchored
+from ...planner.skills.skill import Anchor, Pair, Phase
 from ..policy import Observation
 
 SAME, SAME_TURN = 0.003, 0.05
@@ -31,6 +32,10 @@ class Places:
         """Return the index of an object."""
         return self._objects[name]
 
+    def stands(self, name: str) -> bool:
+        """Return whether a thing is furniture, or a part of it."""
+        return name in self._furniture
+
     def pose(self, name: str, observation: Observation) -> Pose:
         """Return the pose of a thing in the world.
 
@@ -43,6 +48,17 @@ class Places:
         if name in self._furniture:
             return Pose.from_vector(observation["furniture_pose"][self._furniture[name]])
         return self._fixed[name] if name else Pose.identity()
+
+
+def point_of(task: TaskDescription, name: str, anchor: Anchor) -> Pose:
+    """Return a point of an object in the object's frame.
+
+    Args:
+        task: the task.
+        name: of the object.
+        anchor: the point, in shares of half the object's size.
+    """
+    return anchored(anchor, next(each.size for each in task.objects if each.name == name))
 
 
 def ends_alike(phase: Phase) -> tuple[Pose, ...]:
@@ -59,3 +75,25 @@ def _distinct(poses: Iterable[Pose], most: int) -> Iterator[Pose]:
             yield pose
             if len(known) == most:
                 return
+
+
+def level_imitation(path: PosePath, goal: Pose) -> PosePath:
+    """Imitate a path that ends at a goal, moved only level: a difference in tilt turns the hand, not the path.
+
+    Args:
+        path: the demonstrated path.
+        goal: pose of the last one.
+    """
+    turn = Pose.from_yaw([0.0, 0.0, 0.0], (goal @ path[-1].inverse()).yaw)
+    level = Pose.from_position_quaternion(goal.position - (turn @ path[-1]).position) @ turn
+    return path.moved(level).with_tool((level @ path[-1]).inverse() @ goal)
+
+
+def pairs_of(parts: Sequence[str], names: Sequence[str]) -> tuple[Pair, ...]:
+    """Return the contacts of every part with every thing.
+
+    Args:
+        parts: of the body, or "held".
+        names: of the things; "" for none.
+    """
+    return tuple((part, name) for part in parts for name in names if name)

@@ -2,39 +2,35 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import suppress
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...envs import TaskDescription
-from ...planner import Pose, PosePath
+from ...planner import PosePath
 from ...planner.errors import PlanFailed
-from ...planner.imitation.segmentation import resampled
-from ...planner.imitation.tsia import departure, ending
-from ...planner.skills.alike import turned_about
-from ...planner.skills.skill import START, Phase, Skill
+from ...planner.geometry.pose import nearest
+from ...planner.imitation.tsia import departure
+from ...planner.skills.skill import Phase, Skill
+from ...planner.skills.thing import touching
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor
-from .goal_choice import ChosenMotion, MotionChoice
-from .skill_goals import Places, ends_alike
+from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor, parted
+from .goal_choice import ChosenMotion
+from .skill_motions import SkillMotions
+from .skill_steps import Transfer, Way, steps_of
+from .task_skills import things_of
 
 if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings
 
 TRIES = 3
 """Number of grasps of one object before the program gives up."""
-TAILS = (math.inf, 0.06, 0.03)
-"""Path lengths [m] at the end of a carry that are imitated: all, or less where the demonstrated way is out of reach."""
-LEANS = tuple(np.deg2rad([0.0, 15.0, -15.0, 30.0, -30.0]))
-"""Angles [rad] about the line on which the fingers close by which the hand may lean to reach farther."""
-RAISED = (0.0, 0.003, 0.006, 0.010, 0.015)
-"""Heights [m] above the demonstrated grasp that are tried: another hand, or another object, leaves less room."""
-HAND = ("fingers", "hand")
-"""Parts of the body that touch a thing that is grasped or pushed."""
+AWAY = 0.10
+"""Path length [m] by which a hand moves away that still touches what it has let go."""
+PATIENCE = 5.0
+"""Time [s] to wait for an object."""
 
 
 class SkillProgram:
@@ -49,210 +45,249 @@ class SkillProgram:
 
     def __init__(self, task: TaskDescription, skill: Skill, settings: ProgramSettings, executor: ArmExecutor):
         self.task, self.skill, self.settings, self.executor = task, skill, settings, executor
-        self._paths = {phase.name: resampled(phase.path, settings.resample) for phase in skill.phases}
-        self._places = Places(task)
-        self._starts: dict[str, Pose] = {}
-        self._leaving: PosePath | None = None
-        self.paths = [LabeledPath("demonstrated", name, path) for name, path in self._paths.items()]
+        self.motions = SkillMotions(task, skill, settings, executor)
+        self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.motions.paths.items()]
 
     def actions(self) -> Iterator[np.ndarray]:
         """Yield the actions of all phases in order."""
-        for phase, following in zip(self.skill.phases, [*self.skill.phases[1:], None], strict=True):
-            if phase.kind == "carry":
-                continue
-            if phase.kind == "reach" and following is not None and following.kind == "carry":
-                yield from self._fetch_and_carry(phase, following)
-            elif phase.kind == "reach":
-                yield from self._reach(phase)
-            elif phase.kind == "slide":
-                yield from self._slide(phase)
-            elif phase.kind == "articulate":
-                yield from self._push(phase)
+        doing = {"reach": self._reach, "slide": self._slide, "articulate": self._push, "leave": self._leave}
+        in_hand = self.skill.in_hand
+        for step in steps_of(self.skill):
+            if isinstance(step, Transfer):
+                yield from self._transfer(step, in_hand=in_hand)
+                in_hand = False
+            elif step.kind in doing:
+                self.executor.slow_down(step.speed)
+                yield from doing[step.kind](step)
         yield from self._withdraw()
 
-    def _pose(self, name: str) -> Pose:
-        return self._places.pose(name, self.executor.observation)
-
-    def _fetch_and_carry(self, reach: Phase, carry: Phase) -> Iterator[np.ndarray]:
+    def _transfer(self, step: Transfer, *, in_hand: bool) -> Iterator[np.ndarray]:
         """Fetch an object and carry it away; one that was not grasped, or was lost on the way, is fetched again."""
-        self._starts[carry.thing] = self._pose(carry.thing)
+        if not in_hand:
+            yield from self._awaited(step)
+        self.motions.starts[step.carry.thing] = self.motions.pose(step.carry.thing)
         for chance in range(TRIES):
             try:
-                yield from self._fetch(reach, carry)
-                yield from self._lift(reach, carry)
-                yield from self._place(reach, carry)
+                if in_hand and chance == 0:
+                    yield from self._take_over(step)
+                else:
+                    yield from self._fetch(step)
+                    yield from self._lift(step)
+                yield from self._place(step)
                 return
             except PlanFailed as failed:
-                if chance + 1 == TRIES or failed.reason != "dropped":
+                if chance + 1 == TRIES or failed.reason != "dropped" or step.reach is None:
                     raise
-            yield from self._let_go(reach)
+            yield from self._let_go(step.reach)
 
-    def _let_go(self, reach: Phase) -> Iterator[np.ndarray]:
-        """Open the hand after a grasp that failed."""
-        yield from self.executor.grip(OPEN, self.settings.open)
+    def _awaited(self, step: Transfer) -> Iterator[np.ndarray]:
+        """Open the hand, and rise until the object is there: it is not handed over under an arm."""
+        reach, executor = step.reach, self.executor
+        if reach is None or not reach.awaited_on:
+            return
+        executor.slow_down(reach.speed)
+        yield from executor.grip(OPEN, self.settings.open)
+        if step.lift is not None and not self._lies(reach):
+            for action in executor.follow(self.motions.rising(step.lift), exact=False):
+                yield action
+                if self._lies(reach):
+                    return
+        left = round(PATIENCE / self.task.control_dt)
+        while not self._lies(reach):
+            if left == 0:
+                raise PlanFailed("timeout", f"{reach.thing} was not handed over")
+            left -= 1
+            yield executor.still()
+
+    def _lies(self, reach: Phase) -> bool:
+        """Return whether an object lies on what it is awaited on."""
+        return bool(self.motions.pose(reach.thing).position[2] > self.motions.pose(reach.awaited_on).position[2])
+
+    def _let_go(self, came: Phase | None, opening: float = OPEN) -> Iterator[np.ndarray]:
+        """Open the hand, which leaves as it came in a phase."""
+        yield from self.executor.grip(opening, self.settings.open)
         self.executor.release()
-        self._leaving = self._paths[reach.name].reversed()
+        self.motions.leaving = None if came is None else self.motions.paths[came.name].reversed()
 
-    def _fetch(self, reach: Phase, carry: Phase) -> Iterator[np.ndarray]:
-        """Take the object with a grasp from which it can be carried on."""
-        executor = self.executor
-        motion, choice = self._chosen_fetch(reach, carry)
-        executor.allow(motion.allowed)
-        self.paths.append(LabeledPath("final", reach.name, choice.path))
-        yield from executor.go(choice)
-        yield from executor.wait(self.settings.settle)
-        yield from executor.grip(CLOSE, self.settings.close)
-
-    def _chosen_fetch(self, reach: Phase, carry: Phase) -> tuple[MotionChoice, ChosenMotion]:
-        """Choose a grasp from which the object can be carried on, as much like the one shown as possible.
-
-        In this order: as shown; raised until the hand touches nothing; with less of the demonstrated carry; with a hand
-        that leans; with other objects brushed; with a search in joint space.
-        """
-        executor, begun, failure = self.executor, None, None
-        own, everything = (reach.thing,), tuple(each.name for each in self.task.objects)
-        for touched, lean, tail, height in product((own, everything), LEANS, TAILS, RAISED):
-            motion, then = self._grasping(reach, carry, touched, height, tail, lean)
-            try:
-                choice = executor.choose(motion, then, search=False)
-            except PlanFailed as failed:
-                failure = failure or failed
-                continue
-            if choice.then is not None:
-                return motion, choice
-            begun = begun or (motion, choice)
-        for height in RAISED:
-            motion, then = self._grasping(reach, carry, (reach.thing,), height, TAILS[0])
-            with suppress(PlanFailed):
-                return motion, executor.choose(motion, then)
-        if begun is not None:
-            return begun
-        assert failure is not None
-        raise failure
-
-    def _grasping(
-        self, reach: Phase, carry: Phase, touched: Sequence[str], height: float, tail: float, lean: float = 0.0
-    ) -> tuple[MotionChoice, Callable[[int], MotionChoice]]:
-        """Return the motion to all grasps that look alike, and the carry from each of them."""
-        at, up = self._pose(reach.thing), Pose.from_position_quaternion([0.0, 0.0, height])
-        tilt = turned_about(np.array([1.0, 0.0, 0.0]), np.zeros(3), lean)
-        goals = tuple(up @ at @ grasp @ tilt for grasp in ends_alike(reach))
-        held = [goal.inverse() @ at for goal in goals]
-        motion = self._motion(reach, goals, _contacts(HAND, touched), leaving=self._leaving)
-        return motion, lambda index: self._placement(reach, carry, held[index], lift=True, tail=tail)
-
-    def _lift(self, reach: Phase, carry: Phase) -> Iterator[np.ndarray]:
-        """Lift the object off its support as demonstrated, without detours near it."""
-        executor, index = self.executor, self._places.index(carry.thing)
-        grasped = executor.tcp_from(index)
-        executor.hold(index, self.task.objects[index].parts, grasped)
-        motion = self._placement(reach, carry, grasped, lift=True)
-        executor.allow(motion.allowed)
-        path = executor.departure_path(motion)
-        if path is not None:
-            yield from executor.leave(path, OFF)
-        executor.lifted()
-
-    def _place(self, reach: Phase, carry: Phase) -> Iterator[np.ndarray]:
-        """Carry the object, which slips a little during the lift, from its present pose in the hand."""
-        executor = self.executor
-        motion, choice = self._chosen_placement(reach, carry)
-        executor.allow(motion.allowed)
-        self.paths.append(LabeledPath("final", carry.name, choice.path))
-        yield from executor.go(choice)
-        yield from executor.wait(self.settings.settle)
-        if carry.gripper == "open":
-            yield from executor.grip(OPEN, self.settings.open)
-            executor.release()
-            self._leaving = self._paths[reach.name].reversed()
+    def _take_over(self, step: Transfer) -> Iterator[np.ndarray]:
+        """Hold what is in the hand from the start, and lift it if it stands on something."""
+        self.executor.slow_down(step.carry.speed)
+        self.executor.allow(self.motions.contacts(step.lift or step.carry))
+        yield from self.executor.grip(CLOSE, self.settings.close)
+        if self._stands(step):
+            yield from self._lift(step)
         else:
-            self._leaving = None
+            self._hold(step.carry)
 
-    def _chosen_placement(self, reach: Phase, carry: Phase) -> tuple[MotionChoice, ChosenMotion]:
-        """Choose where the carry ends, with as much of the demonstrated way to it as can be reached."""
-        executor, held = self.executor, self.executor.lifted()
-        for tail in TAILS:
-            motion = self._placement(reach, carry, held, lift=False, tail=tail)
-            with suppress(PlanFailed):
-                return motion, executor.choose(motion, search=False)
-        motion = self._placement(reach, carry, held, lift=False)
-        return motion, executor.choose(motion)
+    def _stands(self, step: Transfer) -> bool:
+        """Return whether an object is nearer to a support than where a lift ends."""
+        things, pairs = things_of(self.task), self.motions.contacts(step.lift or step.carry)
+        held = {name for part, name in pairs if part == "held" and name in things and not things[name].free}
+        near = [(things[name], self.motions.pose(name)) for name in held]
+        thing = step.carry.thing
+        return bool(touching(things[thing], self.motions.pose(thing), near, OFF))
 
-    def _placement(self, reach: Phase, carry: Phase, held: Pose, *, lift: bool, tail: float = math.inf) -> MotionChoice:
-        """Return the motion of the hand that carries the object.
+    def _hold(self, phase: Phase) -> None:
+        index = self.motions.index(phase)
+        self.executor.hold(index, self.task.objects[index].parts, self.motions.tcp_from(phase))
 
-        Args:
-            reach: the phase before.
-            carry: the phase.
-            held: `tcp_from_object`.
-            lift: whether the object must be lifted first.
-            tail: path length [m] at the end of the demonstrated path that is imitated.
-        """
-        at = self._starts[carry.thing] if carry.reference == START else self._pose(carry.reference)
-        tcp_from_object = held.inverse()
-        goals = tuple(at @ end @ tcp_from_object for end in ends_alike(carry))
-        path = self._paths[carry.name].with_tool(tcp_from_object)
-        contacts = (*_contacts(HAND, (carry.thing, *carry.touching)), *_contacts(("held",), self._around(carry)))
-        index = self._places.index(carry.thing)
-        shown = ending(path, tail)
-        motion = self._motion(carry, goals, contacts, path=shown, held=(index, held), leaving=path if lift else None)
-        return motion if shown is path else motion._replace(done=0)
+    def _fetch(self, step: Transfer) -> Iterator[np.ndarray]:
+        """Take the object with a grasp from which it can be carried on."""
+        assert step.reach is not None
+        self.executor.slow_down(step.reach.speed)
+        yield from self._parted(step)
+        yield from self._go(self._chosen_fetch(step))
+        yield from self._end(step.reach)
 
-    def _around(self, carry: Phase) -> tuple[str, ...]:
-        """Return the names of what a carried object touches at its end, and of what it may have stood on."""
-        return (*carry.touching, *(each.name for each in self.task.fixtures), *self._supports(carry.thing))
+    def _parted(self, step: Transfer) -> Iterator[np.ndarray]:
+        """Move the hand away from what it has let go, if it still touches that, or what is beside it."""
+        leaving, executor = self.motions.leaving, self.executor
+        if leaving is None or executor.is_clear(self.motions.fetching(step)):
+            return
+        away = departure(leaving, executor.arm.fk(executor.q), AWAY)
+        yield from executor.follow(away, exact=False, detours=False)
+        self.motions.leaving = None
 
-    def _supports(self, name: str) -> tuple[str, ...]:
-        return tuple(each.name for each in self.task.furniture)
-
-    def _motion(
-        self,
-        phase: Phase,
-        goals: tuple[Pose, ...],
-        contacts: Sequence[tuple[str, str]],
-        *,
-        path: PosePath | None = None,
-        held: tuple[int, Pose] | None = None,
-        leaving: PosePath | None = None,
-    ) -> MotionChoice:
-        executor = self.executor
-        around = executor.world_model.obstacles_if_holding(executor.observation, None if held is None else held[0])
-        body = executor.empty if held is None else executor.body_with(self.task.objects[held[0]].parts, held[1])
-        names = {obstacle.name for obstacle in around}
-        wanted = (*self.task.touching, *contacts)
-        allowed = tuple(pair for pair in dict.fromkeys(wanted) if pair[0] in body.names and pair[1] in names)
-        shown = self._paths[phase.name] if path is None else path
-        done = 0
-        if held is not None:
-            done = len(departure(shown, shown[0], self.settings.motion.departure)) - 1
-        return MotionChoice(phase.name, shown, goals, body, around, allowed, leaving, done=done)
-
-    def _reach(self, phase: Phase) -> Iterator[np.ndarray]:
-        """Go to a thing that is moved on its hinge."""
-        executor, at = self.executor, self._stood(phase)
-        motion = self._motion(phase, tuple(at @ end for end in ends_alike(phase)), _contacts(HAND, phase.touching))
-        executor.allow(motion.allowed)
-        choice = executor.choose(motion)
-        self.paths.append(LabeledPath("final", phase.name, choice.path))
-        yield from executor.go(choice)
-        yield from self._end(phase)
-
-    def _stood(self, phase: Phase) -> Pose:
-        """Return where what moves on its joints stood at first, as it is recorded: it is pushed from there."""
-        return self._starts.setdefault(phase.reference, self._pose(phase.reference))
+    def _go(self, choice: ChosenMotion | None) -> Iterator[np.ndarray]:
+        """Execute the motions of one phase."""
+        phase = "" if choice is None or choice.motion is None else choice.motion.name
+        while choice is not None and choice.motion is not None and choice.motion.name == phase:
+            self.executor.world_model.set_margin(choice.motion.clearance)
+            self.executor.allow(choice.motion.allowed)
+            self.paths.append(LabeledPath("final", phase, choice.path))
+            if not choice.motion.detours:
+                return
+            yield from self.executor.go(choice)
+            choice = choice.then
 
     def _end(self, phase: Phase) -> Iterator[np.ndarray]:
-        """Close or open the hand as at the end of a phase in which it holds no free object."""
+        """Do with the gripper what a phase ends with in which it holds no free object."""
         if phase.gripper == "close":
             yield from self.executor.wait(self.settings.settle)
             yield from self.executor.grip(CLOSE, self.settings.close)
         elif phase.gripper == "open":
             yield from self.executor.grip(OPEN, self.settings.open)
 
+    def _chosen_fetch(self, step: Transfer) -> ChosenMotion:
+        """Choose a grasp from which the object can be carried on, as much like the one shown as possible.
+
+        In this order: as shown; raised until the hand touches nothing; with less of the demonstrated carry; with a hand
+        that leans; turned by a quarter turn, where it fits around the object; with other objects brushed; with a search
+        in joint space.
+        """
+        assert step.reach is not None
+        begun, failure, reached = None, None, set[Way]()
+        for way in step.ways:
+            # where the hand gets to the object, it is the way on that is out of reach, as high as it may take it
+            if way._replace(height=0.0) in reached or not self.motions.fits(step.reach, way):
+                continue
+            try:
+                choice = self.executor.choose(self.motions.fetching(step, way), search=False)
+            except PlanFailed as failed:
+                failure = failure or failed
+                continue
+            if choice.complete:
+                return choice
+            begun = begun or choice
+            reached.add(way)
+        for way in step.raised:
+            try:
+                return self.executor.choose(self.motions.fetching(step, way))
+            except PlanFailed as failed:
+                failure = failure or failed
+        if begun is not None:
+            return begun
+        assert failure is not None
+        raise failure
+
+    def _lift(self, step: Transfer) -> Iterator[np.ndarray]:
+        """Lift the object off its support as demonstrated, without detours near it."""
+        executor, carry = self.executor, step.carry
+        executor.slow_down(carry.speed)
+        self._hold(carry)
+        grasped = self.motions.tcp_from(carry)
+        if step.lift is not None:
+            executor.allow(self.motions.contacts(step.lift))
+            yield from self._away(self.motions.from_here(step.lift), OFF, carry.speed)
+        else:
+            motion = self.motions.placing(carry, grasped, lift=True)
+            executor.allow(motion.allowed)
+            path = executor.departure_path(motion)
+            if path is not None:
+                yield from executor.leave(path, OFF)
+        executor.lifted()
+
+    def _place(self, step: Transfer) -> Iterator[np.ndarray]:
+        """Carry the object, which slips a little during the lift, from its present pose in the hand."""
+        carry, failed = step.carry, list[int]()
+        for chance in range(carry.tries):
+            choice = self._chosen_placement(step, failed)
+            try:
+                yield from self._go(choice)
+                if carry.exact:
+                    yield from self._insert(carry)
+                break
+            except PlanFailed as failure:
+                if chance + 1 == carry.tries or failure.reason == "dropped":
+                    raise
+            failed.append(self.motions.end_index(carry, choice.index, failed))
+        yield from self.executor.wait(getattr(self.settings, carry.pause))
+        self.motions.leaving = None
+        if carry.gripper == "open":
+            if carry.touch is not None:  # it was no obstacle while it was held
+                self.executor.allow(carry.touch)
+            yield from self._let_go(step.reach, carry.opening)
+
+    def _insert(self, carry: Phase) -> Iterator[np.ndarray]:
+        """Go straight to the end, in contact; where that proves blocked, go back."""
+        path, executor = self.motions.inserting(carry, self.motions.tcp_from(carry)), self.executor
+        try:
+            yield from executor.follow(path, detours=False)
+        except PlanFailed as failed:
+            here = nearest(path, executor.arm.fk(executor.q))
+            if here and failed.reason != "dropped":
+                yield from executor.follow(path[: here + 1].reversed(), exact=False, detours=False)
+            raise
+
+    def _chosen_placement(self, step: Transfer, failed: Collection[int]) -> ChosenMotion:
+        """Choose where the carry ends, with as much of the demonstrated way to it as can be reached."""
+        choose, carry, held = self.executor.choose, step.carry, self.executor.lifted()
+        for tail in step.tails:
+            with suppress(PlanFailed):
+                return choose(self.motions.placing(carry, held, tail=tail, failed=failed), search=False)
+        if carry.clearance:
+            with suppress(PlanFailed):
+                return choose(self.motions.placing(carry, held, failed=failed, clearance=carry.clearance))
+        return choose(self.motions.placing(carry, held, failed=failed))
+
+    def _reach(self, phase: Phase) -> Iterator[np.ndarray]:
+        """Go to a thing that is moved on its hinge, or to where the hand should be."""
+        yield from self._go(self.executor.choose(self.motions.reaching(phase)))
+        yield from self._end(phase)
+
+    def _leave(self, phase: Phase) -> Iterator[np.ndarray]:
+        """Follow the path from where the hand is, at first straight out, where a detour would push things over."""
+        executor, path = self.executor, self.motions.from_here(phase)
+        executor.allow(self.motions.contacts(phase))
+        if phase.straight:
+            yield from self._away(path, phase.straight, 1.0)
+        else:
+            yield from executor.follow(path, exact=False)
+        self.motions.leaving = None
+
+    def _away(self, path: PosePath, straight: float, speed: float) -> Iterator[np.ndarray]:
+        """Follow a path straight for a distance [m], in contact, then free, at a share of the speed limits."""
+        near, rest = parted(path, straight)
+        yield from self.executor.follow(near, exact=False, detours=False)
+        self.executor.slow_down(speed)
+        self.executor.allow(())
+        if rest is not None:
+            yield from self.executor.follow(rest, exact=False)
+
     def _slide(self, phase: Phase) -> Iterator[np.ndarray]:
         """Move the object along what it touches as was commanded, from where the hand has brought it."""
-        executor, path, at = self.executor, self._paths[phase.name], self._pose(phase.reference)
-        tcp_from_object = executor.tcp_from(self._places.index(phase.thing)).inverse()
+        executor, path, at = self.executor, self.motions.paths[phase.name], self.motions.pose(phase.reference)
+        tcp_from_object = self.motions.tcp_from(phase).inverse()
         here = executor.arm.fk(executor.q)
         shown = at @ phase.goals[0] @ path[-1].inverse()
         # of the turns that look alike, the one that was chosen for the carry
@@ -261,30 +296,20 @@ class SkillProgram:
         yield from executor.follow(way, detours=False)
         yield from executor.wait(self.settings.settle)
         if phase.gripper == "open":
-            yield from executor.grip(OPEN, self.settings.open)
-            executor.release()
-            self._leaving = self._paths[next(each.name for each in self.skill.phases if each.thing == phase.thing)]
-            self._leaving = self._leaving.reversed()
+            yield from self._let_go(next(each for each in self.skill.phases if each.thing == phase.thing))
 
     def _push(self, phase: Phase) -> Iterator[np.ndarray]:
-        """Follow what was commanded where the hand pushes, relative to where the thing is."""
-        path = self._paths[phase.name]
-        here = self._stood(phase)
+        """Follow what was commanded where the hand pushes, relative to where the thing stood."""
+        path, there = self.motions.paths[phase.name], self.motions.reference(phase)
         shown = path[-1] @ phase.goals[0].inverse()
-        self.executor.allow(_contacts(HAND, phase.touching))
-        yield from self.executor.follow(path.moved(here @ shown.inverse()), detours=False, exact=False)
+        self.executor.allow(self.motions.contacts(phase))
+        yield from self.executor.follow(path.moved(there @ shown.inverse()), detours=False, exact=False)
         yield from self._end(phase)
 
     def _withdraw(self) -> Iterator[np.ndarray]:
         """Move away from what was released, as shown, or back as the hand came."""
         last = self.skill.phases[-1]
-        path = self._paths[last.name] if last.kind == "withdraw" else self._leaving
-        if path is None:
-            return
-        here = self.executor.arm.fk(self.executor.q)
-        away = departure(path, here, self.settings.motion.departure)
-        yield from self.executor.follow(away, exact=False, detours=False)
-
-
-def _contacts(parts: Sequence[str], names: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    return tuple((part, name) for part in parts for name in names if name)
+        path = self.motions.paths[last.name] if last.kind == "withdraw" else self.motions.leaving
+        away = None if path is None else self.motions.withdrawing(last, path)
+        if away is not None:
+            yield from self.executor.follow(away, exact=False, detours=last.as_shown)

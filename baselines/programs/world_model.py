@@ -16,8 +16,6 @@ TABLE = "table"
 TABLE_MARGIN, OBJECT_MARGIN = 0.001, 0.003
 """Margins [m] of table and objects, small because the task itself comes close: objects are placed there."""
 OBSTACLE_KEYS = ("obstacle_active", "obstacle_shape", "obstacle_size", "obstacle_pose", "obstacle_velocity")
-FREE_MARGIN = 0.010
-"""Margin [m] where no approach is needed: a moving arm lags some millimeters behind its guarded pose."""
 MOVED = 1e-3
 """Change of a pose vector's entry from which an object counts as moved."""
 
@@ -53,8 +51,9 @@ class WorldModel:
 
     def set_margin(self, margin: float) -> None:
         """Set the margin [m] of objects and furniture from now on."""
-        self._margin = margin
-        self._poses[:] = np.inf
+        if margin != self._margin:
+            self._margin = margin
+            self._poses[:] = np.inf
 
     def exclude(self, index: int | None) -> None:
         """Exclude the object in the hand from now on; None: the hand is empty."""
@@ -70,20 +69,24 @@ class WorldModel:
         rows = np.column_stack([observation[key].reshape(len(self._obstacle_rows), -1) for key in OBSTACLE_KEYS])
         if moved.any():
             self._poses[:] = poses
-            self._things = self._standing(poses, self._held)
+            self._things = self._standing(poses, self._held, self._margin)
         if moved.any() or (rows != self._obstacle_rows).any():
             self._obstacle_rows = rows
             self._seen = (*self._things, *obstacles_in(observation))
         return self._seen
 
-    def obstacles_if_holding(self, observation: Observation, held: int | None) -> tuple[Obstacle, ...]:
+    def obstacles_if_holding(
+        self, observation: Observation, held: int | None, margin: float | None = None
+    ) -> tuple[Obstacle, ...]:
         """Return the obstacles as if an object were in the hand.
 
         Args:
             observation: the present one.
             held: index of the object; None: the hand is empty.
+            margin: margin [m] of objects and furniture; None: the present one.
         """
-        return (*self._standing(self._places(observation), held), *obstacles_in(observation))
+        margin = self._margin if margin is None else margin
+        return (*self._standing(self._places(observation), held, margin), *obstacles_in(observation))
 
     def _places(self, observation: Observation) -> np.ndarray:
         """Return the poses (n, 7) of all objects and furniture."""
@@ -91,8 +94,8 @@ class WorldModel:
             return observation["object_pose"]
         return np.concatenate([observation["object_pose"], observation["furniture_pose"]])
 
-    def _standing(self, poses: np.ndarray, held: int | None) -> tuple[Obstacle, ...]:
-        objects, furniture, margin = self._task.objects, self._task.furniture, self._margin
+    def _standing(self, poses: np.ndarray, held: int | None, margin: float) -> tuple[Obstacle, ...]:
+        objects, furniture = self._task.objects, self._task.furniture
         obstacles_if_holding = [
             replace(part, margin=margin)
             for k, (each, pose) in enumerate(zip(objects, poses, strict=False))

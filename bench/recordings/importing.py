@@ -192,7 +192,6 @@ def _check_sizes(recording: Recording, sizes: Mapping[str, np.ndarray]) -> None:
 
 def _task(task: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return the task of a demonstration, the names of the motions that it needs, and what to say about it."""
-    from ...baselines.screw_policy import PROGRAMS
     from ...envs import task_at
     from ...envs.dotted_names import is_dotted
     from ..task_table import TASKS
@@ -201,7 +200,8 @@ def _task(task: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
         return "", (), ()
     if is_dotted(task):
         return task_at(task).name, (), ()
-    if task not in PROGRAMS:
-        return task, (), (f"{task!r} is none of the shipped tasks ({', '.join(PROGRAMS)}): its motions have no names",)
+    named = {name: facts.skill for name, facts in TASKS.items() if facts.skill is not None}
+    if task not in named:
+        return task, (), (f"{task!r} is none of the shipped tasks ({', '.join(named)}): its motions have no names",)
     shown = TASKS[task].demonstrated_task or task
-    return shown, PROGRAMS[task].SEGMENTS, ()
+    return shown, named[task].required, ()

@@ -19,6 +19,7 @@ from ..task_table import TASKS, environment_id, facts_of
 
 if TYPE_CHECKING:
     from ...planner import Demonstration
+    from ...planner.skills.skill import SegmentedSkill
 
 OWN_KEYS = ("robot", "level", "obstacles", "render_mode", "declared")
 """Environment arguments that are config keys of their own, or the task itself."""
@@ -137,9 +138,7 @@ def _check_guest(cell: RunConfig, source: str | Path) -> None:
 
 def _check_key_poses(cell: RunConfig, grid: Grid) -> None:
     """Refuse key poses in a task that knows no segments."""
-    from ...baselines.screw_policy import PROGRAMS
-
-    if cell.key_poses is not None and cell.task not in PROGRAMS:
+    if cell.key_poses is not None and facts_of(cell.task).skill is None:
         reason = f"are those of named segments, and {cell.task} is done without names: leave key_poses and level S out"
         raise BadConfig(grid.blame("key_poses"), "key_poses", reason)
 
@@ -163,20 +162,20 @@ def _check_settings(cell: RunConfig, grid: Grid) -> None:
 def fitting_demonstration(cell: RunConfig) -> Demonstration:
     """Return the demonstration of a cell, checked against the cell's task.
 
-    A task that has no program needs no names: a skill must be found in the demonstration.
+    A task that does not say what segments mean needs none: a skill must be found in the demonstration.
 
     Raises:
         BadDemonstration: the file is unreadable, belongs to another task, lacks a segment or shows no skill.
         UnknownName: no such demonstration is shipped.
     """
-    from ...baselines.screw_policy import PROGRAMS
     from ...configs import load_demonstration
     from ...configs.shipped_files import demonstration_path, is_shipped
 
     file = demonstration_path(cell.demonstration)
     demonstration = load_demonstration(cell.demonstration)
-    if cell.task in PROGRAMS:
-        _check_names(file, demonstration, cell)
+    skill = facts_of(cell.task).skill
+    if skill is not None:
+        _check_names(file, demonstration, cell, skill)
     else:
         _check_skill(cell.task, file, demonstration)
     if not is_shipped(file):  # those are compared by a test
@@ -184,33 +183,31 @@ def fitting_demonstration(cell: RunConfig) -> Demonstration:
     return demonstration
 
 
-def _check_names(file: Path, demonstration: Demonstration, cell: RunConfig) -> None:
-    """Refuse a demonstration of another task, or without the segments that the program of the task looks at."""
-    from ...baselines.screw_policy import PROGRAMS
-
-    task, segments = facts_of(cell.task).demonstrated_task or cell.task, PROGRAMS[cell.task].SEGMENTS
+def _check_names(file: Path, demonstration: Demonstration, cell: RunConfig, skill: SegmentedSkill) -> None:
+    """Refuse a demonstration of another task, or without the segments that the task's skill consists of."""
+    task = facts_of(cell.task).demonstrated_task or cell.task
     if demonstration.task != task:
         raise BadDemonstration(file, "task", f"is {demonstration.task!r}; the task of this run is {task!r}")
     names = [segment.name for segment in demonstration.segments]
-    for name in segments:
+    for name in skill.required:
         if name not in names:
             there = ", ".join(names) or "none"
-            reason = f"{name!r} is missing; {task!r} needs {', '.join(segments)}, there are: {there}"
+            reason = f"{name!r} is missing; {task!r} needs {', '.join(skill.required)}, there are: {there}"
             raise BadDemonstration(file, "segment_names", reason)
-    _check_content(file, demonstration, PROGRAMS[cell.task])
+    _check_content(file, demonstration, skill)
 
 
-def _check_content(file: Path, demonstration: Demonstration, program: Any) -> None:
-    """Refuse a demonstration that lacks something else that the program of a task looks at."""
-    for name in program.SIZED:
+def _check_content(file: Path, demonstration: Demonstration, skill: SegmentedSkill) -> None:
+    """Refuse a demonstration that lacks something else that a skill needs."""
+    for name in skill.sized:
         if name not in demonstration.object_sizes:
             there = ", ".join(demonstration.object_sizes) or "none"
-            reason = f"of {name!r} is missing; this task needs {', '.join(program.SIZED)}, there are: {there}"
+            reason = f"of {name!r} is missing; this task needs {', '.join(skill.sized)}, there are: {there}"
             raise BadDemonstration(file, "object_sizes", reason)
-    if program.RELEASE:
-        after = demonstration.segment(program.RELEASE).stop + 1
+    for name in skill.releases:
+        after = demonstration.segment(name).stop + 1
         if demonstration.gripper is None or after >= len(demonstration.gripper):
-            reason = f"says nothing about how the hand opens after {program.RELEASE!r}, which this task needs"
+            reason = f"says nothing about how the hand opens after {name!r}, which this task needs"
             raise BadDemonstration(file, "gripper", reason)
 
 

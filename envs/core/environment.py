@@ -12,7 +12,8 @@ import gymnasium as gym
 import numpy as np
 
 from ...planner import Obstacle, Pose
-from ...planner.errors import BadOption, UnknownName
+from ...planner.errors import BadOption
+from ...planner.skills.skill import SegmentedSkill
 from ..errors import BadAction, NoRoom
 from ..scene.robot_description import robot_parts
 from ..scene.robots import Robot
@@ -29,6 +30,7 @@ from .levels import checked_obstacles, level_named
 from .obstacle_placement import placed
 from .placement_context import ObstacleRequest, PlacementContext, PlacementMotion
 from .progress import Progress
+from .reset_options import checked_choice
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
@@ -40,22 +42,6 @@ MAX_LAYOUTS = 40
 Observation = dict[str, np.ndarray]
 ProgressT = TypeVar("ProgressT", bound=Progress)
 """Progress class of a task."""
-
-
-def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
-    """Return the value if it is one of the known ones.
-
-    Args:
-        option: name of the option, for the message.
-        value: value to check.
-        known: allowed values.
-
-    Raises:
-        UnknownName: the value is not among them.
-    """
-    if not isinstance(value, str) or value not in known:
-        raise UnknownName(option, value, known)
-    return value
 
 
 class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
@@ -73,6 +59,9 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
 
     All environments share the other arguments and describe them in their docstrings.
     """
+
+    SKILL: SegmentedSkill | None = None
+    """What the segments of the task's demonstration mean; None: its skill is found in the demonstration."""
 
     _goal_pose: np.ndarray
     _progress: ProgressT
@@ -138,6 +127,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
             touching=parts.touching,
             obstacles=SLOTS,
             control_mode=self.control_mode,
+            skill=self.SKILL,
         )
 
     def __getstate__(self) -> dict[str, Any]:

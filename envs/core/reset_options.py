@@ -1,4 +1,4 @@
-"""Checks of the options given to `reset(options=...)`."""
+"""Checks of the options given to environments and to `reset(options=...)`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,22 @@ import numpy as np
 from ...planner import Arm
 from ...planner.errors import BadOption, UnknownName
 from ...planner.robot.joint_limits import beyond_limit, within_limits
+
+
+def checked_choice(option: str, value: object, known: tuple[str, ...]) -> str:
+    """Return the value if it is one of the known ones.
+
+    Args:
+        option: name of the option, for the message.
+        value: value to check.
+        known: allowed values.
+
+    Raises:
+        UnknownName: the value is not among them.
+    """
+    if not isinstance(value, str) or value not in known:
+        raise UnknownName(option, value, known)
+    return value
 
 
 def check_known(options: Iterable[str], known: tuple[str, ...]) -> None:

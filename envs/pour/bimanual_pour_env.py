@@ -24,6 +24,7 @@ from ..simulation.simulation import Start
 from ..simulation.state import State
 from .geometry import SOURCE, TARGET, level_hand
 from .rules import PourProgress
+from .skill import BIMANUAL_SKILL
 
 ARMS = ("right", "left")
 """Names of the arms: the right hand holds the source, the left one the target."""
@@ -148,6 +149,8 @@ class BimanualPourEnv(TaskEnv[PourProgress]):
     ## Version History
     * v0: first version.
     """
+
+    SKILL = BIMANUAL_SKILL
 
     def __init__(
         self,

@@ -26,6 +26,7 @@ from .geometry import BACK, BEADS, GLASSES, SOURCE, STANDS, TARGET, TILTED, UP, 
 from .layout import GAP, LONG_GAP, RANGES, checked_stands, pour_layout
 from .places import POUR_PLACES
 from .rules import PourProgress
+from .skill import POUR_SKILL
 
 OPTIONS = ("level", "obstacles", "stands", "joint_positions")
 RAISED, ABOVE = 0.12, (0.0, 0.04, 0.08)
@@ -120,6 +121,8 @@ class PourEnv(TaskEnv[PourProgress]):
     ## Version History
     * v0: first version.
     """
+
+    SKILL = POUR_SKILL
 
     def __init__(
         self,

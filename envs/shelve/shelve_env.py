@@ -9,9 +9,9 @@ import numpy as np
 from ...planner import Box, Obstacle, Pose
 from ...planner.errors import BadOption
 from ...planner.geometry.shapes import pack
-from ..core.environment import MAX_LAYOUTS, Observation, TaskEnv, checked_choice
+from ..core.environment import MAX_LAYOUTS, Observation, TaskEnv
 from ..core.placement_context import ObstacleRequest, PlacementMotion
-from ..core.reset_options import check_known, checked_joints
+from ..core.reset_options import check_known, checked_choice, checked_joints
 from ..core.spaces import pose_box
 from ..scene.body_clearance import arm_clearance
 from ..scene.robots import places_of, robot_named
@@ -24,6 +24,7 @@ from .options import OPTIONS, given_layout
 from .parts import BOOK_SIZE, SHELVES, books, cupboard, stand
 from .places import SHELF_PLACES
 from .rules import ShelveProgress
+from .skill import SHELVE_SKILL
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
 LIFT, INSERTION_DEPTH = 0.15, 0.22
@@ -127,6 +128,8 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
     ## Version History
     * v0: first version.
     """
+
+    SKILL = SHELVE_SKILL
 
     def __init__(
         self,

@@ -8,10 +8,9 @@ import numpy as np
 
 from ...planner.errors import BadOption
 from ..core.dense_reward import closeness, placing
-from ..core.environment import checked_choice
 from ..core.grasped_start import SQUEEZE, holding_joints
 from ..core.placement_context import PlacementMotion
-from ..core.reset_options import checked_joints, checked_poses
+from ..core.reset_options import checked_choice, checked_joints, checked_poses
 from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
 from ..core.spaces import REACH
 from ..simulation.simulation import Start

@@ -22,6 +22,7 @@ from .grasps import above, block_grasps, block_poses, check_places
 from .layout import BASE_GAP, LONG_GAP, RANGES, stack_layout
 from .reach_rules import MAX_ANGLE, MAX_OFFSET, ReachProgress
 from .rules import BLOCK_SIZE
+from .skill import REACH_SKILL
 
 OPTIONS = ("level", "obstacles", "object_poses", "joint_positions")
 HEIGHT = 0.08
@@ -102,6 +103,7 @@ class ReachEnv(SingleMotionEnv[ReachProgress]):
     * v0: first version.
     """
 
+    SKILL = REACH_SKILL
     GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(

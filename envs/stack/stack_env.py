@@ -19,6 +19,7 @@ from ..simulation.simulation import Start
 from .grasps import above, block_grasps, block_poses, check_places
 from .layout import BASE_GAP, LONG_GAP, RANGES, stack_layout
 from .rules import BLOCK, BLOCK_SIZE, StackProgress
+from .skill import STACK_SKILL
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
 OPTIONS = ("level", "obstacles", "object_poses", "base_pose", "joint_positions")
@@ -103,6 +104,8 @@ class StackEnv(TaskEnv[StackProgress]):
     ## Version History
     * v0: first version.
     """
+
+    SKILL = STACK_SKILL
 
     def __init__(
         self,

@@ -83,3 +83,18 @@ def _across(axis: np.ndarray) -> np.ndarray:
 def hand_turns() -> tuple[Pose, ...]:
     """Return the turns of a hand with two fingers about its approach axis (z of the tcp) that look alike."""
     return (Pose.identity(), turned_about(UP, np.zeros(3), HALF_TURN))
+
+
+def standing(pose: Pose) -> Pose:
+    """Return the frame of a round thing that stands: its yaw means nothing."""
+    return Pose.from_position_quaternion(pose.position)
+
+
+def turned_like(held: Pose, shown: Pose) -> Pose:
+    """Turn a round thing in the hand about its own axis, as near as can be to how it was held.
+
+    Args:
+        held: `tcp_from_object`.
+        shown: `tcp_from_object` of the other grasp.
+    """
+    return held @ Pose.from_yaw([0.0, 0.0, 0.0], (held.inverse() @ shown).yaw)

@@ -15,10 +15,9 @@ from ..geometry.pose import Pose, PosePath
 from ..imitation.demonstration import Demonstration
 from ..imitation.segmentation import trimmed
 from .alike import hand_turns, own_turns, reference_turns
-from .articulations import Articulation, articulations
+from .articulations import Articulation, articulations, at_time, phases_of_push, same_sign
 from .corrected import corrected, regrasped, said_reference
 from .grips import BRIEF, Closing, Grip, grips
-from .pushes import at_time, phases_of_push, same_sign
 from .references import Reference, reference_of
 from .skill import START, Choice, Phase, Skill
 from .slides import slide_of, slides_from

@@ -12,17 +12,17 @@ import pytest
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.programs.arm_executor import ArmExecutor
-from onedemo.baselines.programs.pour_goals import PourGoals, turned_like
 from onedemo.baselines.recording.import_pour import pour_from_poses
 from onedemo.baselines.recording.record_pour import record_pour
 from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
-from onedemo.envs.pour.geometry import GLASSES, SOURCE, TARGET, level_hand, tcp_from_glass
+from onedemo.envs.pour.geometry import GLASSES, SOURCE, level_hand, tcp_from_glass
 from onedemo.planner import Planner, ReactivePlanner
-from onedemo.planner.errors import BadDemonstration
+from onedemo.planner.errors import BadDemonstration, PlanFailed
 from onedemo.planner.geometry.pose import Pose
+from onedemo.planner.geometry.shapes import Cylinder
 from onedemo.planner.imitation.demonstration_files import read_demonstration, save_demonstration
 from onedemo.planner.recordings.import_recording import demonstration_of
 from onedemo.planner.recordings.pose_columns import TableRequest
@@ -104,21 +104,50 @@ def test_the_planner_pours_again_and_again(env, level):
     assert not any(record.contacts for record in records)
 
 
-def test_goals_keep_the_lip_over_the_rim_for_every_turn_and_every_hold(env):
-    goals = PourGoals(env.unwrapped.task, SHOWN, None)
-    target = Pose.from_yaw([0.1, 0.2, 1.05], 2.0)
+@pytest.mark.parametrize("radii, heights", [((0.030, 0.043), (0.10, 0.10)), ((0.023, 0.060), (0.08, 0.14))])
+def test_goals_keep_the_lip_over_the_rim_for_every_turn_every_hold_and_glasses_of_other_sizes(env, radii, heights):
+    task = env.unwrapped.task
+    glasses = [Cylinder(radius, height) for radius, height in zip(radii, heights, strict=True)]
+    objects = (replace(each, shape=glass, parts=()) for each, glass in zip(task.objects, glasses, strict=True))
+    observation, _ = env.reset(seed=0, options={"level": "L2"})
+    program = make_policy("screw", replace(task, objects=tuple(objects)), SHOWN).begin(observation).program
+    carry = next(phase for phase in program.skill.phases if phase.kind == "carry")
     # held lower, and turned about its own axis, which nobody sees
-    held = Pose.from_position_quaternion([0.0, -0.01, 0.0]) @ goals.held @ Pose.from_yaw([0, 0, 0], 1.0)
-    glass = GLASSES[SOURCE]
-    for turn in (0.0, 0.5, -1.0):
-        cup = goals.pouring(target, held, turn) @ held
-        rim = target.position + np.array([0.0, 0.0, 0.5 * GLASSES[TARGET].height])
+    shown = carry.object_from_tcp.inverse()
+    held = Pose.from_position_quaternion([0.0, -0.01, 0.0]) @ shown @ Pose.from_yaw([0, 0, 0], 1.0)
+    motion = program.motions.placing(carry, held)
+    assert len(motion.goals) == 13
+    for k in range(len(motion.goals)):
+        cup = motion.then(k).goals[0] @ held
+        rim = observation["object_pose"][1, :3] + np.array([0.0, 0.0, 0.5 * heights[1]])
         down = -cup.rotation[2, :2] / np.linalg.norm(cup.rotation[2, :2])
-        lip = (cup @ Pose.from_position_quaternion([*(glass.radius * down), 0.5 * glass.height])).position
+        lip = (cup @ Pose.from_position_quaternion([*(radii[0] * down), 0.5 * heights[0]])).position
         np.testing.assert_allclose(np.linalg.norm((lip - rim)[:2]), 0.028, atol=3e-3)
         assert lip[2] - rim[2] == pytest.approx(0.02, abs=3e-3)
         assert np.degrees(cup.tilt) == pytest.approx(115.0, abs=1.0)
-    assert turned_like(held, goals.held).inverse().distance_to(goals.held.inverse())[1] < 1e-6
+    # a direction that proved blocked is not tried again, unless no other is left
+    others = program.motions.placing(carry, held, failed=[0, 2])
+    assert len(others.goals) == 11 and others.goals[0].distance_to(motion.goals[1])[0] < 1e-9
+    assert program.motions.end_index(carry, 1, [0, 2]) == 3
+    assert len(program.motions.placing(carry, held, failed=range(13)).goals) == 13
+
+
+def test_a_glass_is_lifted_straight_up_where_no_lift_was_shown(env):
+    without = replace(SHOWN, segments=tuple(each for each in SHOWN.segments if each.name != "lift"))
+    observation, _ = env.reset(seed=0)
+    program = make_policy("screw", env.unwrapped.task, without).begin(observation).program
+    lift = next(phase for phase in program.skill.phases if phase.kind == "lift")
+    here = program.executor.arm.fk(program.executor.q)
+    path = program.motions.from_here(lift)
+    np.testing.assert_allclose(path[-1].position - here.position, [0.0, 0.0, 0.08], atol=1e-9)
+    assert path[-1].distance_to(here)[1] < 1e-9
+
+
+def test_without_an_approach_the_glass_must_be_in_the_hand(env):
+    without = replace(SHOWN, segments=tuple(each for each in SHOWN.segments if each.name != "approach"))
+    observation, _ = env.reset(seed=0)
+    with pytest.raises(PlanFailed, match="shows no approach"):
+        make_policy("screw", env.unwrapped.task, without).begin(observation)
 
 
 def test_a_recording_that_never_tilts_is_refused(tmp_path):
