@@ -277,7 +277,7 @@ class SkillMotions:
                 guided=False,
                 must_keep=phase.must_keep,
                 enough=None,
-                then=None if then is None else lambda _: then(index),
+                then=None if then is None else lambda _, on=then: on(index),
             )
 
         free = tuple(pair for pair in motion.allowed if pair in self.task.touching)
