@@ -57,6 +57,7 @@ class MotionChoice(NamedTuple):
         searched: number of goals for which joint space is searched; None: all of them.
         parts: number of motions, this one and those that follow, without which it is none.
         clearance: margin [m] of objects while it is followed.
+        blindly: the best is followed even if no plan arrives: what the guard and the moment allow decides.
         reaches: quick test whether the arm has a posture at a goal; goals without one are left out; None: no test.
     """
 
@@ -77,6 +78,7 @@ class MotionChoice(NamedTuple):
     searched: int | None = None
     parts: int = 1
     clearance: float = OBJECT_MARGIN
+    blindly: bool = False
     reaches: Callable[[Pose], bool] | None = None
 
     @property
@@ -203,7 +205,7 @@ def choose(
         motion_method: method of executing motions.
 
     Raises:
-        PlanFailed: "blocked" or "ik_or_limit", no goal can be reached.
+        PlanFailed: "blocked" or "ik_or_limit", no goal can be reached, and the motion is not to be followed blindly.
     """
     if then is not None:
         motion = motion._replace(then=then)
@@ -212,6 +214,8 @@ def choose(
     if settings.search is not None and not best.complete:
         few = motion._replace(goals=motion.goals[: motion.searched])
         best = _best(chain([best], _choices(motion_method, arm, settings, q, few)), motion)
+    if motion.blindly:
+        return best
     if not best.plan.success:
         reason = "ik_or_limit" if best.plan.reason == "ik_or_limit" else "blocked"
         raise PlanFailed(reason, f"no goal of {motion.name} can be reached along the demonstration: {best.plan.why}")

@@ -256,6 +256,7 @@ class SkillMotions:
         """Return a motion in two parts if only the second one may be in contact; the first one is free."""
         if phase.round:
             motion = motion._replace(enough=Enough(MARGIN, as_shown=phase.kind == "carry"), searched=SEARCHED)
+            motion = motion._replace(blindly=phase.kind == "carry")
         if phase.before is None and math.isinf(phase.touch_within):
             return motion._replace(then=then)
         if phase.before is not None:

@@ -158,7 +158,9 @@ class SkillProgram:
             if not choice.motion.detours:
                 return
             yield from self.executor.go(choice)
-            choice = choice.then
+            motion, index, choice = choice.motion, choice.index, choice.then
+            if choice is None and motion.blindly and motion.then is not None:
+                choice = self.executor.choose(motion.then(index))
 
     def _end(self, phase: Phase) -> Iterator[np.ndarray]:
         """Do with the gripper what a phase ends with in which it holds no free object."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,6 +24,8 @@ ENTRIES = 4
 MOVES = 0.01
 """Displacement [m] from which an object is drawn as one that moves."""
 LINES = ("#1f4fd8", "#b5179e", "#007f5f", "#b35c00", "#5f3dc4", "#5c5c00")
+PART = re.compile(r" part \d+$")
+"""End of the name of a phase that is one of several of a push."""
 FACES = {"reach": "#e6eefc", "carry": "#fbe6f6", "slide": "#fdf0dc", "articulate": "#fdf0dc", "withdraw": "#efefef"}
 MILLIMETERS = 1e3
 EDGE = 0.07
@@ -79,10 +82,13 @@ def spans_of(demonstration: Demonstration, skill: Skill) -> list[Span]:
     since = demonstration.time - demonstration.time[0]
     held, _ = grips(demonstration)
     events = sorted([*held, *articulations(demonstration, held)], key=lambda event: event.held)
-    begin, found = 0, []
-    for number, event in enumerate(events, 1):
-        mine = [phase for phase in skill.phases if _number(phase) == number and phase.kind != "withdraw"]
-        edges = [begin, event.held, *_slide_begins(demonstration, event, mine), event.released]
+    begin, found, done = 0, [], []
+    for event in events:
+        done.append(event.name if isinstance(event, Grip) else event.reference or "the world")
+        number = done.count(done[-1])
+        moved = done[-1] if number == 1 else f"{done[-1]} ({number})"
+        mine = [phase for phase in skill.phases if PART.sub("", phase.name).partition(" ")[2] == moved]
+        edges = [begin, *_between(demonstration, event, mine), event.released]
         for phase, start, stop in zip(mine, edges, edges[1:], strict=False):
             found.append(Span(phase.name, phase.kind, float(since[start]), float(since[stop])))
         begin = event.released
@@ -91,19 +97,15 @@ def spans_of(demonstration: Demonstration, skill: Skill) -> list[Span]:
     return found
 
 
-def _slide_begins(demonstration: Demonstration, event: Grip | Articulation, phases: list[Phase]) -> list[int]:
-    """Return the sample at which what was carried begins to slide, if it does."""
-    if not isinstance(event, Grip) or not any(phase.kind == "slide" for phase in phases):
-        return []
+def _between(demonstration: Demonstration, event: Grip | Articulation, phases: list[Phase]) -> list[int]:
+    """Return the samples at which one phase of a grip or a push ends and the next one begins."""
+    if isinstance(event, Articulation):
+        return sorted({event.held, *(sample for sample, _ in event.grips)})
+    if not any(phase.kind == "slide" for phase in phases):
+        return [event.held]
     carry = next(phase for phase in phases if phase.kind == "carry")
     begins = slides_from(demonstration, event, carry)
-    return [] if begins is None else [begins]
-
-
-def _number(phase: Phase) -> int:
-    """Return the number of the grip or push that a phase belongs to: it stands in the names from the second on."""
-    number = phase.name.rpartition("(")[2].rstrip(")")
-    return int(number) if phase.name.endswith(")") and number.isdigit() else 1
+    return [event.held] if begins is None else [event.held, begins]
 
 
 def _draw_times(axes: Any, demonstration: Demonstration, skill: Skill) -> None:

@@ -99,7 +99,7 @@ def test_one_demonstration_stacks_three_blocks(env, level, seed):
     assert record.seconds < 35
     assert max(record.numbers["position_error"]) < 0.01
     labels = [path.motion for path in report.paths if path.label == "final"]
-    assert labels == [f"{verb} block{k}" for k in range(3) for verb in ("fetch", "place")]
+    assert labels == [f"{verb} block{k}" for k in range(3) for verb in ("approach", "transfer")]
 
 
 @pytest.mark.slow

@@ -95,7 +95,7 @@ class Mine:
 
 
 def test_your_own_policy_is_shown_the_key_poses_alone(monkeypatch):
-    monkeypatch.setattr("onedemo.baselines.own_policy.imported", lambda name, form: Mine)
+    monkeypatch.setattr("onedemo.baselines.own_policy.imported", lambda name, form, wanted: Mine)
     policy = make_policy("my.mod:Mine", None, shown("pour"), key_poses=5)
     assert {len(policy.shown.segment_path(each.name)) for each in policy.shown.segments} == {5}
 
