@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from ..console import COMMAND_LINE, check_picture, console, counted, labeled, writing
@@ -109,7 +109,7 @@ def report_lines(loaded: LoadedRobot, request: RobotRequest) -> Iterator[tuple[s
         arm.joint_names, arm.chain[:, 7], arm.lower, arm.upper, arm.velocity_limits, strict=False
     ):
         unit = "m" if kind else "rad"
-        limits = f"{low:8.3f} to {high:7.3f} {unit}" if np.isfinite(high - low) else "without limits"
+        limits = f"{low:8.3f} to {high:7.3f} {unit}" if math.isfinite(high - low) else "without limits"
         yield "joint     ", "", f"{name:{width}}  {limits:24}  {speeds or f'{speed:.4g} {unit}/s'}"
     for name, value in report.held.items():
         yield "held      ", "", f"{name} at {value:g}"
@@ -126,7 +126,7 @@ def report_lines(loaded: LoadedRobot, request: RobotRequest) -> Iterator[tuple[s
         named = ", ".join(f"{one} and {other}" for one, other in loaded.ignored) or "none"
         yield "srdf      ", "", f"pairs of parts that it exempts: {named}"
     for piece in volumes_of(loaded):
-        solid = "its geometry is swept" if np.isnan(piece.geometry) else f"its geometry {1e3 * piece.geometry:.3f} l"
+        solid = "its geometry is swept" if math.isnan(piece.geometry) else f"its geometry {1e3 * piece.geometry:.3f} l"
         ratio = f", ratio {piece.volume / piece.geometry:.2f}" if piece.geometry > 0 else ""
         count = f"{counted(piece.capsules, 'capsule'):{len(str(piece.capsules)) + 9}}"
         yield "part      ", "", f"{piece.name:8}  {count}  {1e3 * piece.volume:7.3f} l, {solid}{ratio}"
