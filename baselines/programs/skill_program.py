@@ -47,6 +47,7 @@ class SkillProgram:
         self.task, self.skill, self.settings, self.executor = task, skill, settings, executor
         self.motions = SkillMotions(task, skill, settings, executor)
         self.paths = [LabeledPath("demonstrated", name, path) for name, path in self.motions.paths.items()]
+        self._lifted: PosePath | None = None
 
     def actions(self) -> Iterator[np.ndarray]:
         """Yield the actions of all phases in order."""
@@ -154,7 +155,9 @@ class SkillProgram:
         while choice is not None and choice.motion is not None and choice.motion.name == phase:
             self.executor.world_model.set_margin(choice.motion.clearance)
             self.executor.allow(choice.motion.allowed)
-            self.paths.append(LabeledPath("final", phase, choice.path))
+            whole = choice.path if self._lifted is None else self._lifted.joined(choice.path)
+            self._lifted = None
+            self.paths.append(LabeledPath("final", phase, whole))
             if not choice.motion.detours:
                 return
             yield from self.executor.go(choice)
@@ -210,7 +213,8 @@ class SkillProgram:
         grasped = self.motions.tcp_from(carry)
         if step.lift is not None:
             executor.allow(self.motions.contacts(step.lift))
-            yield from self._away(self.motions.from_here(step.lift), OFF, carry.speed)
+            path = self.motions.from_here(step.lift)
+            yield from self._away(path, OFF, carry.speed)
         else:
             motion = self.motions.placing(carry, grasped, lift=True)
             executor.allow(motion.allowed)
@@ -218,6 +222,7 @@ class SkillProgram:
             if path is not None:
                 yield from executor.leave(path, OFF)
         executor.lifted()
+        self._lifted = path
 
     def _place(self, step: Transfer) -> Iterator[np.ndarray]:
         """Carry the object, which slips a little during the lift, from its present pose in the hand."""
