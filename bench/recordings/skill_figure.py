@@ -24,6 +24,7 @@ ENTRIES = 4
 MOVES = 0.01
 """Displacement [m] from which an object is drawn as one that moves."""
 LINES = ("#1f4fd8", "#b5179e", "#007f5f", "#b35c00", "#5f3dc4", "#5c5c00")
+DASHES = ("--", ":", "-.")
 PART = re.compile(r" part \d+$")
 """End of the name of a phase that is one of several of a push."""
 FACES = {"reach": "#e6eefc", "carry": "#fbe6f6", "slide": "#fdf0dc", "articulate": "#fdf0dc", "withdraw": "#efefef"}
@@ -115,15 +116,18 @@ def _draw_times(axes: Any, demonstration: Demonstration, skill: Skill) -> None:
     moved = [name for name in ways if ways[name].max() > MOVES]
     for k, name in enumerate(moved):
         axes.plot(since, ways[name], color=LINES[k % len(LINES)], linewidth=1.4, label=name)
-    for name, values in demonstration.other_joints.items():
-        if np.ptp(values) > MOVES and not FINGERS.search(name):
-            axes.plot(since, values - values[0], color=INK, linestyle="--", label=f"{name} [rad or m]")
+    joints = {name: np.abs(values - values[0]) for name, values in demonstration.other_joints.items()}
+    turned = [name for name in joints if joints[name].max() > MOVES and not FINGERS.search(name)]
+    for k, name in enumerate(turned):
+        axes.plot(since, joints[name], color=INK, linestyle=DASHES[k % len(DASHES)], label=f"{name} [rad or m]")
     top = axes.get_ylim()[1]
     for k, span in enumerate(spans_of(demonstration, skill)):
         axes.axvspan(span.start, span.stop, color=FACES[span.kind], zorder=0, linewidth=0)
         middle = np.clip(0.5 * (span.start + span.stop), EDGE * since[-1], (1.0 - EDGE) * since[-1])
         place = (float(middle), top * (1.02 + 0.13 * (k % 2)))
-        axes.text(*place, span.name, ha="center", va="bottom", fontsize=6.5)
+        at_edge = span.stop >= since[-1] and span.stop - span.start < 2.0 * EDGE * since[-1]
+        place = (float(since[-1]), place[1]) if at_edge else place
+        axes.text(*place, span.name, ha="right" if at_edge else "center", va="bottom", fontsize=6.5)
     if demonstration.gripper is not None:
         for closing in closings(demonstration.gripper):
             label = "hand closed" if closing.start == closings(demonstration.gripper)[0].start else None
