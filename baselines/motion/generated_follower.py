@@ -29,6 +29,7 @@ from ...planner import (
 from ...planner.control.arm_arrays import PURSUIT_STATE
 from ...planner.planning.plan import check_success
 from ...planner.reactive.motion_state import MotionState
+from ...planner.resumable import CALL, Resumable
 from .motion_method import PATH
 from .path_generators import GeneratedPath, PathGenerator
 from .tool_obstacles import ToolObstacles
@@ -116,6 +117,6 @@ class GeneratedFollower(ReactivePlanner):
     def _near(self) -> ToolObstacles:
         return ToolObstacles.of(self.arm, self.body, self._obstacles, self._known_allowed(self._obstacles))
 
-    def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
-        assert self.motion is not None
-        self.motion.plan_now, self._outdated = False, True
+    def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> Resumable[None]:
+        yield CALL
+        self._outdated = True

@@ -13,14 +13,15 @@ import numpy as np
 
 from ...planner import Arm, Body, Plan, PlanRequest, PlanSettings, PosePath, guide_index, imitated_path
 from ...planner.control.arm_arrays import arm_arrays
-from ...planner.control.pursuit import ARRIVED, fresh_pursuit_state
+from ...planner.control.pursuit import ARRIVED
 from ...planner.control.reachability import gap, why_not_reached
 from ...planner.errors import told_apart
 from ...planner.geometry.pose import METERS_PER_RADIAN
 from ...planner.planning.plan import MotionPlanner, pose_goal
-from ...planner.planning.planning_scene import PlanningScene, SceneTemplate
+from ...planner.planning.planning_scene import PlanningScene, scene_template
 from ...planner.planning.requests import checked_request
-from ...planner.safety.guarded_pursuit import guarded_roll_out
+from ...planner.resumable import CALL, Resumable, finished
+from ...planner.safety.guarded_pursuit import roll_out
 from .motion_method import NO_PATH, PATH
 from .path_generators import PathGenerator
 from .tool_obstacles import ToolObstacles
@@ -44,12 +45,13 @@ class GeneratedPlanner(MotionPlanner):
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, generator: PathGenerator):
         self.arm, self.body, self.settings, self.generator = arm, body, settings, generator
         motion = settings.motion
-        self._template = SceneTemplate(arm, body, settings.safety, motion.dt, guard=settings.guard)
+        self._template = scene_template(arm, body, settings.safety, motion.dt, settings.guard)
         self._work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
         self._trace = np.empty((round(settings.max_seconds / motion.dt) + 1, arm.dof))
 
-    def answer(self, request: PlanRequest) -> Plan:
-        """Plan a motion; `next_motion` and `seed` mean nothing to a path generator."""
+    def answering(self, request: PlanRequest) -> Resumable[Plan]:
+        """Plan a motion, without a pause; `next_motion` and `seed` mean nothing to a path generator."""
+        yield CALL
         begun = time.perf_counter()
         request = checked_request(request, self.arm)
         q, distance = np.asarray(request.start), self.settings.safety.distance
@@ -104,9 +106,6 @@ class GeneratedPlanner(MotionPlanner):
 
     def _rolled_out(self, scene: PlanningScene, path: PosePath, q: np.ndarray) -> tuple[np.ndarray, bool, float, int]:
         """Follow a path kinematically: return joints at every tick, arrival, joint margin, ticks the guard changed."""
-        scratch, pursuit_state = np.empty((2, self.arm.dof)), fresh_pursuit_state()
-        status, last, margin, changed = guarded_roll_out(
-            self._work, scene.robot, path.dqs, q.copy(), self.settings.motion.dt, pursuit_state, scratch[0], scratch[1],
-            self._trace, 0,
-        )  # fmt: skip
-        return self._trace[: last + 1].copy(), status == ARRIVED, float(margin), int(changed)
+        dt = self.settings.motion.dt
+        found = finished(roll_out(self._work, scene.robot, path.dqs, q, dt, self._trace))
+        return found.joints.copy(), found.status == ARRIVED, float(found.margin), int(found.changed)

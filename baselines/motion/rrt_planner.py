@@ -15,8 +15,9 @@ from ...planner.imitation.tsia import screw_path
 from ...planner.planning.joint_space_motion import SearchFailure
 from ...planner.planning.joint_space_rrt import sample_ranges
 from ...planner.planning.plan import MotionPlanner, pose_goal
-from ...planner.planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
+from ...planner.planning.planning_scene import PlanningScene, checked_obstacles, scene_template
 from ...planner.planning.requests import checked_request
+from ...planner.resumable import CALL, Resumable
 from ...planner.robot.joint_limits import within_limits
 from .motion_method import JOINTS, NO_PATH
 from .rrt_connect import RrtSettings, joint_path, timed
@@ -52,11 +53,12 @@ class RrtPlanner(MotionPlanner):
 
     def __init__(self, arm: Arm, body: Body, settings: PlanSettings, sampling: RrtSettings):
         self.arm, self.body, self.settings, self.sampling = arm, body, settings, sampling
-        self._template = SceneTemplate(arm, body, settings.safety, settings.motion.dt)
+        self._template = scene_template(arm, body, settings.safety, settings.motion.dt, True)
         self._low, self._high = arm.lower + sampling.margin, arm.upper - sampling.margin
 
-    def answer(self, request: PlanRequest) -> Plan:
-        """Plan a motion; of the demonstrated path only the end matters."""
+    def answering(self, request: PlanRequest) -> Resumable[Plan]:
+        """Plan a motion, without a pause; of the demonstrated path only the end matters."""
+        yield CALL
         begun, request = time.perf_counter(), checked_request(request, self.arm)
         q, goal = np.asarray(request.start), pose_goal(request)
         joints, failure = q[None], SearchFailure("", "")

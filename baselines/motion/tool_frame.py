@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ...planner import Arm, Body, Command, NextMotion, Plan, PlanRequest, PlanSettings, Pose, PosePath, ReactiveSettings
 from ...planner.geometry import dualquat as dq
 from ...planner.planning.plan import MotionPlanner
+from ...planner.resumable import Resumable
 from .motion_method import Follower, MotionMethod, Relative
 
 
@@ -59,7 +60,7 @@ class ToolFramePlanner(MotionPlanner):
         self.arm, self.body, self.settings = arm, planner.body, planner.settings
         self._planner, self._tool = planner, tcp_from_tool
 
-    def answer(self, request: PlanRequest) -> Plan:
+    def answering(self, request: PlanRequest) -> Resumable[Plan]:
         """Plan a motion; see `MotionPlanner`."""
         tool, leaving = self._tool, request.leaving
         there = request._replace(
@@ -68,7 +69,8 @@ class ToolFramePlanner(MotionPlanner):
             leaving=None if leaving is None else leaving.with_tool(tool),
             next_motion=_next_motion(request.next_motion, tool),
         )
-        return seen_from(self._planner.answer(there), self.arm, tool.inverse())
+        plan = yield from self._planner.answering(there)
+        return seen_from(plan, self.arm, tool.inverse())
 
 
 class ToolFrameFollower:

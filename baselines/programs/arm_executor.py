@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import replace
 from itertools import count
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ...planner import (
     Obstacle,
     Plan,
     Planner,
+    PlanRequest,
     Pose,
     PosePath,
     ReactiveSettings,
@@ -26,6 +27,7 @@ from ...planner import (
 from ...planner.errors import PlanFailed
 from ...planner.geometry.shapes import moves
 from ...planner.reactive.command import DONE, ESCAPING, FAILED
+from ...planner.resumable import Paced, Resumable
 from ...planner.robot.joint_limits import near_limit
 from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
 from ..policy import LabeledPath, Observation
@@ -41,7 +43,10 @@ OFF = 0.03
 """Height [m] above its support from which a lifted object may take a detour."""
 GLANCE = 5
 """Ticks between checks of the held object."""
+T = TypeVar("T")
 Actions = Iterator[np.ndarray]
+Thought = Generator[np.ndarray, None, T]
+"""Actions of standing still until a result is there."""
 
 
 class _Held(NamedTuple):
@@ -165,10 +170,17 @@ class ArmExecutor:
         """Set the allowed contacts from now on: of "fingers" or "held" with a named object."""
         self.world_model.allow(contacts)
 
+    def thought(self, work: Resumable[T]) -> Thought[T]:
+        """Stand still while a computation goes on, by a budget per tick; return its result."""
+        paced = Paced(work)
+        while not paced.advance(self._planner.settings.budget):
+            yield self.still()
+        return paced.result
+
     def choose(
         self, motion: MotionChoice, then: Callable[[int], MotionChoice] | None = None, *, search: bool = True
-    ) -> ChosenMotion:
-        """Return the best goal of a motion from here; see `goal_choice.choose`.
+    ) -> Thought[ChosenMotion]:
+        """Return the best goal of a motion from here; see `goal_choice.choose`. Meanwhile the arm stands still.
 
         Args:
             motion: the motion.
@@ -180,19 +192,20 @@ class ArmExecutor:
         """
         plan = self._planner.settings.plan
         plan = plan if search else replace(plan, search=None)
-        return choose(self.arm, plan, self.q, motion, then, self.motion_method)
+        return self.thought(choose(self.arm, plan, self.q, motion, then, self.motion_method))
 
-    def is_clear(self, motion: MotionChoice) -> bool:
+    def is_clear(self, motion: MotionChoice) -> Thought[bool]:
         """Return whether the arm touches nothing, where it is, that it must not touch in a motion."""
         plan, here = self._planner.settings.plan, self.arm.fk(self.q)
-        still = [each for each in motion.obstacles if not moves(each)]
+        still = tuple(each for each in motion.obstacles if not moves(each))
         planner = Planner(self.arm, motion.body, replace(plan, search=None, avoid=False))
-        found = planner.plan(PosePath(np.array([here.dq, here.dq])), self.q, here, still, allowed=motion.allowed)
+        path = PosePath(np.array([here.dq, here.dq]))
+        found = yield from self.thought(planner.answering(PlanRequest(path, self.q, here, still, motion.allowed)))
         return found.reason != "start in collision"
 
-    def departure_path(self, motion: MotionChoice) -> PosePath | None:
+    def departure_path(self, motion: MotionChoice) -> Thought[PosePath | None]:
         """Return the departure of a motion from here; see `goal_choice.departure_path`."""
-        return departure_path(self.arm, self._planner.settings.plan, self.q, motion)
+        return self.thought(departure_path(self.arm, self._planner.settings.plan, self.q, motion))
 
     def go(self, choice: ChosenMotion) -> Actions:
         """Execute the chosen motion."""

@@ -8,9 +8,8 @@ followed by the next motion from its end. Not in the paper, which has one goal.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from ...planner import (
     Obstacle,
     Plan,
     Planner,
+    PlanRequest,
     PlanSettings,
     Pose,
     PosePath,
@@ -32,8 +32,12 @@ from ...planner.errors import PlanFailed
 from ...planner.geometry.shapes import moves
 from ...planner.imitation.tsia import departure, screw_path
 from ...planner.planning.joint_space_motion import MAX_DEVIATION
+from ...planner.resumable import SOLVED, Resumable
 from ..motion.motion_method import DIRECT, ESCAPE, MADE, SCREW, MotionMethod
 from .world_model import OBJECT_MARGIN
+
+PREPARED = 1000.0
+"""Cost [us] of a motion and its planner before anything is planned, see `planner.resumable`."""
 
 
 class MotionChoice(NamedTuple):
@@ -81,10 +85,20 @@ class MotionChoice(NamedTuple):
     blindly: bool = False
     reaches: Callable[[Pose], bool] | None = None
 
-    @property
-    def candidates(self) -> list[int]:
-        """Indices of the goals to try; the first one if the arm has a posture at none."""
-        return [k for k, goal in enumerate(self.goals) if self.reaches is None or self.reaches(goal)] or [0]
+    def candidates(self) -> Resumable[list[int]]:
+        """Return the indices of the goals to try; the first one if the arm has a posture at none."""
+        if self.reaches is None:
+            return list(range(len(self.goals)))
+        found = []
+        for k, goal in enumerate(self.goals):
+            if self.reaches(goal):
+                found.append(k)
+            yield SOLVED
+        return found or [0]
+
+    def is_enough(self, choice: ChosenMotion) -> bool:
+        """Return whether a choice ends the search among the goals."""
+        return self.enough is not None and choice.complete and self.enough.holds(choice)
 
 
 class Enough(NamedTuple):
@@ -191,7 +205,7 @@ def choose(
     motion: MotionChoice,
     then: Callable[[int], MotionChoice] | None = None,
     motion_method: MotionMethod = SCREW,
-) -> ChosenMotion:
+) -> Resumable[ChosenMotion]:
     """Choose the goal of a motion that is reached best and from which the next motion is feasible.
 
     Searches in joint space are tried only where nothing else leads to a goal and on from there.
@@ -209,11 +223,10 @@ def choose(
     """
     if then is not None:
         motion = motion._replace(then=then)
-    quick = replace(settings, search=None)
-    best = _best(_choices(motion_method, arm, quick, q, motion), motion)
+    best = yield from _best(motion_method, arm, replace(settings, search=None), q, motion)
     if settings.search is not None and not best.complete:
         few = motion._replace(goals=motion.goals[: motion.searched])
-        best = _best(chain([best], _choices(motion_method, arm, settings, q, few)), motion)
+        best = yield from _best(motion_method, arm, settings, q, few, best)
     if motion.blindly:
         return best
     if not best.plan.success:
@@ -224,7 +237,7 @@ def choose(
     return best
 
 
-def departure_path(arm: Arm, settings: PlanSettings, q: np.ndarray, motion: MotionChoice) -> PosePath | None:
+def departure_path(arm: Arm, settings: PlanSettings, q: np.ndarray, motion: MotionChoice) -> Resumable[PosePath | None]:
     """Return the departure of a motion: as demonstrated, or, if only that is feasible, straight up by the same length.
 
     Args:
@@ -243,39 +256,54 @@ def departure_path(arm: Arm, settings: PlanSettings, q: np.ndarray, motion: Moti
     up = Pose.from_position_quaternion([0.0, 0.0, length]) @ start
     options = departure(motion.leaving, start, length), screw_path(start, up, radius)
     for path in options:
-        if planner.plan(path, q, path[-1], _still(motion), allowed=motion.allowed).how == DIRECT:
+        plan = yield from planner.answering(PlanRequest(path, q, path[-1], _still(motion), motion.allowed))
+        if plan.how == DIRECT:
             return path
     return options[0]
 
 
-def _choices(
-    motion_method: MotionMethod, arm: Arm, settings: PlanSettings, q: np.ndarray, motion: MotionChoice
-) -> Iterator[ChosenMotion]:
-    """Yield a choice for every goal, each with the best choice of the next motion from there."""
+def _best(
+    motion_method: MotionMethod,
+    arm: Arm,
+    settings: PlanSettings,
+    q: np.ndarray,
+    motion: MotionChoice,
+    known: ChosenMotion | None = None,
+) -> Resumable[ChosenMotion]:
+    """Return the best choice among all goals and a known one, or the first one that is good enough.
+
+    Each comes with the best choice of the next motion from there.
+    """
     quick = replace(settings, search=None)
     if not motion.detours:
         settings = replace(settings, avoid=False, max_deviation=MAX_DEVIATION)
     if not (motion.detours and motion.guided):
         settings = replace(settings, motion=replace(settings.motion, guide=0.0))
-    planner, away = motion_method.planner(arm, motion.body, settings), departure_path(arm, settings, q, motion)
-    for index in motion.candidates:
+    found: list[ChosenMotion] = []
+    if known is not None:
+        found.append(known)
+        if motion.is_enough(known):
+            return known
+    planner, away = (
+        motion_method.planner(arm, motion.body, settings),
+        (yield from departure_path(arm, settings, q, motion)),
+    )
+    for index in (yield from motion.candidates()):
         goal = motion.goals[index]
         following = None if motion.then is None else motion.then(index)
-        plan = planner.plan(
-            motion.demonstrated[motion_method.skipped(motion.done) :],
-            q,
-            goal,
-            _still(motion),
-            allowed=motion.allowed,
-            leaving=away,
-            next_motion=None if following is None else _beginning(following, goal, settings),
-            must_keep=motion.must_keep,
-        )
+        yield PREPARED
+        beginning = None if following is None else _beginning(following, goal, settings)
+        shown = motion.demonstrated[motion_method.skipped(motion.done) :]
+        request = PlanRequest(shown, q, goal, _still(motion), motion.allowed, away, beginning, 0, motion.must_keep)
+        plan = yield from planner.answering(request)
         choice = ChosenMotion(index, plan, away, motion=motion)
         if plan.success and following is not None:
-            best = _best(_choices(motion_method, arm, quick, plan.joints[-1], following), following)
+            best = yield from _best(motion_method, arm, quick, plan.joints[-1], following)
             choice = choice._replace(then=best if best.plan.success else None)
-        yield choice
+        found.append(choice)
+        if motion.is_enough(choice):
+            return choice
+    return max(found, key=lambda choice: _rank(choice, motion.enough))
 
 
 def _beginning(motion: MotionChoice, start: Pose, settings: PlanSettings) -> NextMotion | None:
@@ -287,16 +315,6 @@ def _beginning(motion: MotionChoice, start: Pose, settings: PlanSettings) -> Nex
     return NextMotion(departure(motion.leaving, start, settings.motion.departure))
 
 
-def _best(choices: Iterable[ChosenMotion], motion: MotionChoice) -> ChosenMotion:
-    """Return the best choice, or the first one that is good enough."""
-    found: list[ChosenMotion] = []
-    for choice in choices:
-        found.append(choice)
-        if motion.enough is not None and choice.complete and motion.enough.holds(choice):
-            return choice
-    return max(found, key=lambda choice: _rank(choice, motion.enough))
-
-
 def _rank(choice: ChosenMotion, enough: Enough | None) -> tuple[int, float, bool, float, int]:
     """Rank by the motions that arrive, then by how much they are like the demonstration, then by joint margin."""
     like = choice.share if enough is None else float(choice.as_shown)
@@ -304,5 +322,5 @@ def _rank(choice: ChosenMotion, enough: Enough | None) -> tuple[int, float, bool
     return choice.count, like, choice.margin >= least, choice.margin, -choice.index
 
 
-def _still(motion: MotionChoice) -> list[Obstacle]:
-    return [obstacle for obstacle in motion.obstacles if not moves(obstacle)]
+def _still(motion: MotionChoice) -> tuple[Obstacle, ...]:
+    return tuple(obstacle for obstacle in motion.obstacles if not moves(obstacle))

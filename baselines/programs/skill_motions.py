@@ -16,7 +16,7 @@ from ...planner.imitation.segmentation import resampled
 from ...planner.imitation.tsia import departure, ending, screw_path
 from ...planner.skills.alike import standing, turned_like
 from ...planner.skills.skill import START, TASK_GOAL, Pair, Phase, Skill
-from .arm_executor import ArmExecutor
+from .arm_executor import ArmExecutor, Thought
 from .goal_choice import Enough, MotionChoice
 from .postures import Postures
 from .skill_goals import Places, ends_alike, level_imitation, pairs_of, point_of
@@ -232,7 +232,7 @@ class SkillMotions:
         end = self.reference(carry) @ self._ends[carry.name][0] @ held.inverse()
         return level_imitation(self.paths[carry.name], end)
 
-    def withdrawing(self, phase: Phase, path: PosePath) -> PosePath | None:
+    def withdrawing(self, phase: Phase, path: PosePath) -> Thought[PosePath | None]:
         """Return the beginning of a path, from where the hand is, that leaves what was let go.
 
         Args:

@@ -16,7 +16,7 @@ from ...planner.imitation.tsia import departure
 from ...planner.skills.skill import Phase, Skill
 from ...planner.skills.thing import touching
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor, parted
+from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor, Thought, parted
 from .goal_choice import ChosenMotion
 from .skill_motions import SkillMotions
 from .skill_steps import Transfer, Way, steps_of
@@ -53,6 +53,7 @@ class SkillProgram:
         """Yield the actions of all phases in order."""
         doing = {"reach": self._reach, "slide": self._slide, "articulate": self._push, "leave": self._leave}
         in_hand = self.skill.in_hand
+        yield self.executor.still()  # to begin takes a tick of its own
         for step in steps_of(self.skill):
             if isinstance(step, Transfer):
                 yield from self._transfer(step, in_hand=in_hand)
@@ -137,13 +138,13 @@ class SkillProgram:
         assert step.reach is not None
         self.executor.slow_down(step.reach.speed)
         yield from self._parted(step)
-        yield from self._go(self._chosen_fetch(step))
+        yield from self._go((yield from self._chosen_fetch(step)))
         yield from self._end(step.reach)
 
     def _parted(self, step: Transfer) -> Iterator[np.ndarray]:
         """Move the hand away from what it has let go, if it still touches that, or what is beside it."""
         leaving, executor = self.motions.leaving, self.executor
-        if leaving is None or executor.is_clear(self.motions.fetching(step)):
+        if leaving is None or (yield from executor.is_clear(self.motions.fetching(step))):
             return
         away = departure(leaving, executor.arm.fk(executor.q), AWAY)
         yield from executor.follow(away, exact=False, detours=False)
@@ -163,7 +164,7 @@ class SkillProgram:
             yield from self.executor.go(choice)
             motion, index, choice = choice.motion, choice.index, choice.then
             if choice is None and motion.blindly and motion.then is not None:
-                choice = self.executor.choose(motion.then(index))
+                choice = yield from self.executor.choose(motion.then(index))
 
     def _end(self, phase: Phase) -> Iterator[np.ndarray]:
         """Do with the gripper what a phase ends with in which it holds no free object."""
@@ -173,7 +174,7 @@ class SkillProgram:
         elif phase.gripper == "open":
             yield from self.executor.grip(OPEN, self.settings.open)
 
-    def _chosen_fetch(self, step: Transfer) -> ChosenMotion:
+    def _chosen_fetch(self, step: Transfer) -> Thought[ChosenMotion]:
         """Choose a grasp from which the object can be carried on, as much like the one shown as possible.
 
         In this order: as shown; raised until the hand touches nothing; with less of the demonstrated carry; with a hand
@@ -187,7 +188,7 @@ class SkillProgram:
             if way._replace(height=0.0) in reached or not self.motions.fits(step.reach, way):
                 continue
             try:
-                choice = self.executor.choose(self.motions.fetching(step, way), search=False)
+                choice = yield from self.executor.choose(self.motions.fetching(step, way), search=False)
             except PlanFailed as failed:
                 failure = failure or failed
                 continue
@@ -197,7 +198,7 @@ class SkillProgram:
             reached.add(way)
         for way in step.raised:
             try:
-                return self.executor.choose(self.motions.fetching(step, way))
+                return (yield from self.executor.choose(self.motions.fetching(step, way)))
             except PlanFailed as failed:
                 failure = failure or failed
         if begun is not None:
@@ -218,7 +219,7 @@ class SkillProgram:
         else:
             motion = self.motions.placing(carry, grasped, lift=True)
             executor.allow(motion.allowed)
-            path = executor.departure_path(motion)
+            path = yield from executor.departure_path(motion)
             if path is not None:
                 yield from executor.leave(path, OFF)
         executor.lifted()
@@ -228,7 +229,7 @@ class SkillProgram:
         """Carry the object, which slips a little during the lift, from its present pose in the hand."""
         carry, failed = step.carry, list[int]()
         for chance in range(carry.tries):
-            choice = self._chosen_placement(step, failed)
+            choice = yield from self._chosen_placement(step, failed)
             try:
                 yield from self._go(choice)
                 if carry.exact:
@@ -256,20 +257,22 @@ class SkillProgram:
                 yield from executor.follow(path[: here + 1].reversed(), exact=False, detours=False)
             raise
 
-    def _chosen_placement(self, step: Transfer, failed: Collection[int]) -> ChosenMotion:
+    def _chosen_placement(self, step: Transfer, failed: Collection[int]) -> Thought[ChosenMotion]:
         """Choose where the carry ends, with as much of the demonstrated way to it as can be reached."""
         choose, carry, held = self.executor.choose, step.carry, self.executor.lifted()
         for tail in step.tails:
             with suppress(PlanFailed):
-                return choose(self.motions.placing(carry, held, tail=tail, failed=failed), search=False)
+                motion = self.motions.placing(carry, held, tail=tail, failed=failed)
+                return (yield from choose(motion, search=False))
         if carry.clearance:
             with suppress(PlanFailed):
-                return choose(self.motions.placing(carry, held, failed=failed, clearance=carry.clearance))
-        return choose(self.motions.placing(carry, held, failed=failed))
+                motion = self.motions.placing(carry, held, failed=failed, clearance=carry.clearance)
+                return (yield from choose(motion))
+        return (yield from choose(self.motions.placing(carry, held, failed=failed)))
 
     def _reach(self, phase: Phase) -> Iterator[np.ndarray]:
         """Go to a thing that is moved on its hinge, or to where the hand should be."""
-        yield from self._go(self.executor.choose(self.motions.reaching(phase)))
+        yield from self._go((yield from self.executor.choose(self.motions.reaching(phase))))
         yield from self._end(phase)
 
     def _leave(self, phase: Phase) -> Iterator[np.ndarray]:
@@ -317,6 +320,6 @@ class SkillProgram:
         """Move away from what was released, as shown, or back as the hand came."""
         last = self.skill.phases[-1]
         path = self.motions.paths[last.name] if last.kind == "withdraw" else self.motions.leaving
-        away = None if path is None else self.motions.withdrawing(last, path)
+        away = None if path is None else (yield from self.motions.withdrawing(last, path))
         if away is not None:
             yield from self.executor.follow(away, exact=False, detours=last.as_shown)

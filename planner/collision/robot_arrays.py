@@ -72,6 +72,7 @@ class HeaderColumns(NamedTuple):
     first_vertex: int = 9  # vertices (3) of the meshes [m]
     first_corner: int = 10  # corners (3) of the capsules' hulls [m], `convex_distance.PER_ROW` in a row
     corner_rows: int = 11
+    proofs: int = 12  # steps of proofs of edges in joint space so far: the measure of their work
 
 
 class SettingColumns(NamedTuple):

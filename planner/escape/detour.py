@@ -11,12 +11,12 @@ import math
 from ..collision.edge_certificates import is_clear, longest_displacement, tool_slack
 from ..geometry import screw
 from ..jit import inlined, inner, kernel
-from .escape_tree import grow
-from .tree_arrays import DETOUR_LOG, NODE, OPTION
+from .escape_tree import grow_on, plant
+from .tree_arrays import DETOUR_LOG, GROWTH, NODE, OPTION
 
-FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
+FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT, PAUSED = 0, 1, 2, 3, 4, 5, 6, 7
 """Status of an escape: the path was clear; detours were found; then the reasons of a failure. NODE_LIMIT: a tree was
-stopped while it still had open leaves."""
+stopped while it still had open leaves. PAUSED: there is more to do."""
 MIN_SLACK = 0.005
 """Least slack [m] of a root and of the pose where a detour rejoins, if an obstacle's own margin fills the shell."""
 
@@ -188,26 +188,41 @@ def _joined(path, count, root, branch, size, back, out, spacing):
     return at, rejoined
 
 
+@inlined
+def _most_rows(tree, options):
+    return min(len(tree), int(options[OPTION.nodes]))
+
+
 @inner
-def _grown(g, root, candidates, tree, cells, heap, options, state):
-    """Grow trees at changing scales until one sees a candidate.
+def _grown(g, root, candidates, tree, cells, heap, options, state, growth, left):
+    """Grow trees at changing scales until one sees a candidate, all have failed, or `left` nodes were added.
 
     Returns:
-        (row, candidate, rows of the last tree, True if a tree was full).
+        (row, candidate, number of nodes that may still be added); row -1 if no node sees a candidate.
     """
-    random, away = options[OPTION.random], options[OPTION.away]
-    row, j, count, full = -1, -1, 0, False
-    for attempt in range(int(options[OPTION.retries]) + 1):
-        scale = 1.0
+    random, away, most = options[OPTION.random], options[OPTION.away], _most_rows(tree, options)
+    while growth[GROWTH.attempt] <= options[OPTION.retries]:
+        attempt, scale = int(growth[GROWTH.attempt]), 1.0
         if attempt > 0:
             scale = options[OPTION.shrink] if attempt % 2 == 0 else options[OPTION.grow]
+        step = scale * options[OPTION.step]
+        if growth[GROWTH.open] < 0.0:
+            plant(root, screw.load8(candidates, 0), tree, cells, heap, options, step, growth)
+        before = growth[GROWTH.rows]
         options[OPTION.random] = random if attempt > 0 else 0.0
-        row, j, count = grow(g, root, candidates, tree, cells, heap, options, scale * options[OPTION.step], state)
+        rows = min(most, before + left)
+        row, j = grow_on(g, candidates, tree, cells, heap, options, step, state, growth, rows)
+        options[OPTION.random], options[OPTION.away] = random, away
+        left -= growth[GROWTH.rows] - before
         if row >= 0:
-            break
-        full |= count >= min(len(tree), int(options[OPTION.nodes]))
-    options[OPTION.random], options[OPTION.away] = random, away
-    return row, j, count, full
+            return row, j, left
+        if growth[GROWTH.open] > 0.0 and growth[GROWTH.rows] < most:
+            return -1, -1, left
+        if growth[GROWTH.rows] >= most:
+            growth[GROWTH.full] = 1.0
+        growth[GROWTH.attempt] += 1.0
+        growth[GROWTH.open] = -1.0
+    return -1, -1, left
 
 
 @kernel
@@ -223,8 +238,8 @@ def last_tree(status, detours, most):
 
 
 @kernel
-def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap, options, state, log):
-    """Lead a path around obstacles.
+def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap, options, state, log, growth, most):
+    """Lead a path around obstacles, or go on after a pause.
 
     Args:
         g: the tool among obstacles, see `edge_certificates.tool_arrays`.
@@ -242,30 +257,33 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
         options: see `tree_arrays.OPTION`.
         state: (1,) of the random numbers.
         log: (rounds, 3) one row per detour, see `tree_arrays.DETOUR_LOG`.
+        growth: see `tree_arrays.GROWTH`; zeros at the beginning, left as it is after a pause.
+        most: number of nodes after which to pause.
 
     Returns:
-        (status, number of poses, detours).
+        (status, number of poses, detours); the status PAUSED if there is more to do: then all else must be left alone.
     """
     room = min(len(path), len(out), len(slacks))
-    if not 0 < count <= room:
-        return TOO_LONG, 0, 0
-    if tool_slack(g, screw.load8(path, 0), 1.0) < 0.0:
-        return START_IN_COLLISION, count, 0
-    if tool_slack(g, screw.load8(path, count - 1), 1.0) < 0.0:
-        return GOAL_IN_COLLISION, count, 0
-    certain, enough, most = 0, _enough(options), min(int(options[OPTION.candidates]), len(places), len(poses))
-    rounds = min(int(options[OPTION.rounds]), len(log))
-    for detour in range(rounds):
-        blocked = first_blocked(g, path, count, certain, options)
-        if blocked < 0:
+    if growth[GROWTH.count] == 0.0:
+        if not 0 < count <= room:
+            return TOO_LONG, 0, 0
+        if tool_slack(g, screw.load8(path, 0), 1.0) < 0.0:
+            return START_IN_COLLISION, count, 0
+        if tool_slack(g, screw.load8(path, count - 1), 1.0) < 0.0:
+            return GOAL_IN_COLLISION, count, 0
+        growth[GROWTH.count] = count
+    enough, rounds, left = _enough(options), min(int(options[OPTION.rounds]), len(log)), float(most)
+    while growth[GROWTH.detour] < rounds:
+        count, detour = int(growth[GROWTH.count]), int(growth[GROWTH.detour])
+        if growth[GROWTH.growing] == 0.0 and not _begun(g, path, slacks, places, poses, options, enough, growth):
             return (ESCAPED if detour else FREE), count, detour
-        _slacks(g, path, count, slacks, enough)
-        root = _root(slacks, blocked, enough)
-        size = _candidates(path, slacks, count, blocked, enough, most, places, poses)
-        row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
-        log[detour, DETOUR_LOG.tree_rows] = rows
+        root, size = int(growth[GROWTH.root]), int(growth[GROWTH.candidates])
+        row, j, left = _grown(g, path[root], poses[:size], tree, cells, heap, options, state, growth, left)
+        log[detour, DETOUR_LOG.tree_rows] = growth[GROWTH.rows]
         if row < 0:
-            return (NODE_LIMIT if full else NO_ESCAPE), count, detour
+            if growth[GROWTH.attempt] <= options[OPTION.retries]:
+                return PAUSED, count, detour
+            return (NODE_LIMIT if growth[GROWTH.full] == 1.0 else NO_ESCAPE), count, detour
         length = _branch(tree, row, branch[: len(branch) - 1])
         if length < 0:
             return TOO_LONG, 0, detour
@@ -279,4 +297,21 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
         for k in range(count):
             screw.store8(path, k, screw.load8(out, k))
         log[detour, DETOUR_LOG.first], log[detour, DETOUR_LOG.last] = root, certain
-    return NO_ESCAPE, count, rounds
+        growth[GROWTH.count], growth[GROWTH.certain], growth[GROWTH.growing] = count, certain, 0.0
+        growth[GROWTH.detour] += 1.0
+    return NO_ESCAPE, int(growth[GROWTH.count]), rounds
+
+
+@inner
+def _begun(g, path, slacks, places, poses, options, enough, growth):
+    """Begin the next detour: its root, and where it may rejoin the path; returns False if no edge is blocked."""
+    count, most = int(growth[GROWTH.count]), min(int(options[OPTION.candidates]), len(places), len(poses))
+    blocked = first_blocked(g, path, count, int(growth[GROWTH.certain]), options)
+    if blocked < 0:
+        return False
+    _slacks(g, path, count, slacks, enough)
+    growth[GROWTH.root] = _root(slacks, blocked, enough)
+    growth[GROWTH.candidates] = _candidates(path, slacks, count, blocked, enough, most, places, poses)
+    growth[GROWTH.growing], growth[GROWTH.attempt], growth[GROWTH.full] = 1.0, 0.0, 0.0
+    growth[GROWTH.rows], growth[GROWTH.open] = 0.0, -1.0
+    return True

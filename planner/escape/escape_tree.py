@@ -18,7 +18,7 @@ from ..geometry import screw
 from ..jit import inlined, inner, kernel
 from .heap import pop, push
 from .tangent_plane import SIDES, child_direction, plane_basis
-from .tree_arrays import HEAP, NODE, OPTION, VERDICT
+from .tree_arrays import GROWTH, HEAP, NODE, OPTION, VERDICT
 
 
 @inlined
@@ -260,15 +260,40 @@ def _seen(g, x, candidates):
 
 
 @kernel
-def grow(g, root, candidates, tree, cells, heap, options, step, state):
-    """Grow a tree from a root pose until a node sees one of the candidate poses.
+def plant(root, goal, tree, cells, heap, options, step, growth):
+    """Begin a tree: its root and nothing else.
+
+    Args:
+        root: (8,) pose of the tcp.
+        goal: pose of the path to reach, a tuple of 8.
+        tree: nodes, see `tree_arrays.NODE`.
+        cells: (CELLS,) table of visited cells.
+        heap: open leaves, see `tree_arrays.HEAP`.
+        options: see `tree_arrays.OPTION`.
+        step: length of an edge [m].
+        growth: see `tree_arrays.GROWTH`.
+    """
+    for k in range(len(cells)):
+        cells[k] = -1.0
+    used = heap[len(heap) - 1 - int(options[OPTION.levels]) :, HEAP.used]
+    for k in range(len(used)):
+        used[k] = 0.0
+    x = (root[0], root[1], root[2], root[3], root[4], root[5], root[6], root[7])
+    home, turn = screw.pose_distance(x, goal)
+    _add_node(tree, 0, x, -1, VERDICT.kept, 0.0, math.hypot(home, 0.2 * turn))
+    _visited((0.0, 0.0, 0.0), _attitude_key(tree, x), options[OPTION.cell] * step, cells)
+    growth[GROWTH.rows], growth[GROWTH.open] = 1.0, push(heap, 0, tree[0, NODE.score], 0)
+
+
+@kernel
+def grow_on(g, candidates, tree, cells, heap, options, step, state, growth, rows):
+    """Grow a tree on until a node sees one of the candidate poses, no leaf is open, or it has a number of rows.
 
     The cheapest open leaf is expanded next, at most `beam` leaves per level; its score is a lower bound of the cost of
     all paths through it, so the first leaf that sees a candidate is the cheapest of this tree.
 
     Args:
         g: the tool among obstacles, see `tool_arrays`.
-        root: (8,) pose of the tcp.
         candidates: (m, 8) poses of the path to reach.
         tree: nodes, see `tree_arrays.NODE`.
         cells: (CELLS,) table of visited cells.
@@ -276,22 +301,15 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
         options: see `tree_arrays.OPTION`.
         step: length of an edge [m].
         state: (1,) of the random numbers.
+        growth: see `tree_arrays.GROWTH`; changed.
+        rows: number of rows from which on no leaf is expanded.
 
     Returns:
-        (row, candidate, count): the node that sees a candidate and the candidate, or -1 and -1; and the number of
-        rows of the tree.
+        (row, candidate): the node that sees a candidate and the candidate, or -1 and -1.
     """
-    for k in range(len(cells)):
-        cells[k] = -1.0
     goal, used = screw.load8(candidates, 0), heap[len(heap) - 1 - int(options[OPTION.levels]) :, HEAP.used]
-    for k in range(len(used)):
-        used[k] = 0.0
-    x = (root[0], root[1], root[2], root[3], root[4], root[5], root[6], root[7])
-    home, turn = screw.pose_distance(x, goal)
-    _add_node(tree, 0, x, -1, VERDICT.kept, 0.0, math.hypot(home, 0.2 * turn))
-    _visited((0.0, 0.0, 0.0), _attitude_key(tree, x), options[OPTION.cell] * step, cells)
-    count, size = 1, push(heap, 0, tree[0, NODE.score], 0)
-    while size > 0 and count < min(len(tree), int(options[OPTION.nodes])):
+    count, size, row, j = int(growth[GROWTH.rows]), int(growth[GROWTH.open]), -1, -1
+    while size > 0 and count < rows:
         row = pop(heap, size)
         size -= 1
         level = int(tree[row, NODE.level])
@@ -301,11 +319,12 @@ def grow(g, root, candidates, tree, cells, heap, options, step, state):
         j = _seen(g, screw.load8(tree, row), candidates)
         if j >= 0:
             tree[row, NODE.verdict] = VERDICT.goal_edge
-            return row, j, count
+            break
         if level < int(options[OPTION.levels]):
             end = expand(g, tree, row, count, goal, cells, options, step, state)
             for k in range(count, end):
                 if tree[k, NODE.verdict] == VERDICT.kept:
                     size = push(heap, size, tree[k, NODE.score], k)
             count = end
-    return -1, -1, count
+    growth[GROWTH.rows], growth[GROWTH.open] = count, size
+    return (row, j) if j >= 0 else (-1, -1)

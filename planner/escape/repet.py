@@ -33,7 +33,7 @@ from .detour import (
     last_tree,
 )
 from .tool_checks import checked_masks, checked_tool
-from .tree_arrays import DETOUR_LOG, NODE, OPTION, tree_arrays
+from .tree_arrays import DETOUR_LOG, GROWTH, NODE, OPTION, tree_arrays
 
 Corner = tuple[float, float, float]
 REASONS = {
@@ -275,7 +275,7 @@ def escape_path(
     status, count, detours = escape(
         work, buffers[0], len(path), buffers[1], np.zeros(settings.longest), np.zeros(settings.candidates),
         np.zeros((settings.candidates, 8)), np.zeros((settings.levels + 3, 8)), tree, cells, heap, options,
-        np.array([float(int(seed) % 2147483646) + 1.0]), log,
+        np.array([float(int(seed) % 2147483646) + 1.0]), log, np.zeros(GROWTH.width), np.inf,
     )  # fmt: skip
     rows = int(log[last_tree(status, detours, len(log)), DETOUR_LOG.tree_rows])
     grown = EscapeTree.from_rows(tree[:rows]) if rows else None

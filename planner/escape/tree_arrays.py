@@ -86,8 +86,24 @@ class DetourLogColumns(NamedTuple):
     width: int = 3
 
 
+class GrowthColumns(NamedTuple):
+    """State of a tree that grows, and of the detours of a path: what it takes to go on after a pause."""
+
+    rows: int = 0  # rows of the tree in use
+    open: int = 1  # open leaves in its heap
+    growing: int = 2  # 1 while a tree grows, 0 before the next detour
+    detour: int = 3  # number of detours so far
+    count: int = 4  # poses of the path
+    certain: int = 5  # index of the pose up to which it is proven clear
+    root: int = 6  # index of the pose in which the tree is rooted
+    candidates: int = 7  # number of poses at which the detour may rejoin the path
+    attempt: int = 8  # number of trees before this one
+    full: int = 9  # 1 if one of them had no room for more nodes
+    width: int = 10
+
+
 NODE, VERDICT, OPTION, HEAP = NodeColumns(), Verdicts(), OptionColumns(), HeapColumns()
-DETOUR_LOG = DetourLogColumns()
+DETOUR_LOG, GROWTH = DetourLogColumns(), GrowthColumns()
 
 
 def tree_arrays(most: int, levels: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

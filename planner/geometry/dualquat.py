@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import broadcast_shape, checked_array, numbers
 from ..errors import BadShape, NotFinite, NotUnit
-from ..jit import kernel
+from ..jit import inlined, kernel
 from . import screw
 
 Array = np.ndarray
@@ -101,6 +101,40 @@ def _normalize_rows(x, out):
         screw.store8(out, i, screw.normalized(screw.load8(x, i)))
 
 
+@inlined
+def _norm_and_slant(x, i):
+    """Norm of the primary part of a row, and the size of its product with the dual part."""
+    r = x[i, 0] * x[i, 0] + x[i, 1] * x[i, 1] + x[i, 2] * x[i, 2] + x[i, 3] * x[i, 3]
+    d = x[i, 0] * x[i, 4] + x[i, 1] * x[i, 5] + x[i, 2] * x[i, 6] + x[i, 3] * x[i, 7]
+    return math.sqrt(r), abs(d)
+
+
+@kernel
+def _worst_rows(x):
+    """Row farthest from the unit norm, by how much; largest product of the parts; largest dual number; or NaN."""
+    worst, off, slant, farthest = 0, 0.0, 0.0, 0.0
+    for i in range(len(x)):
+        for k in range(8):
+            if not math.isfinite(x[i, k]):
+                return i, math.nan, math.nan, math.nan
+        norm, product = _norm_and_slant(x, i)
+        if abs(norm - 1.0) > off:
+            worst, off = i, abs(norm - 1.0)
+        slant = max(slant, product)
+        for k in range(4, 8):
+            farthest = max(farthest, abs(x[i, k]))
+    return worst, off, slant, farthest
+
+
+@kernel
+def _project_rows(x):
+    """Project the rows to the manifold that are not on it."""
+    for i in range(len(x)):
+        norm, product = _norm_and_slant(x, i)
+        if abs(norm - 1.0) > ON_MANIFOLD or product > ON_MANIFOLD:
+            screw.store8(x, i, screw.normalized(screw.load8(x, i)))
+
+
 @kernel
 def _from_pose_rows(p, r, out):
     for i in range(len(out)):
@@ -157,19 +191,21 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
         BadShape, NotFinite, NotUnit: x is not a unit dual quaternion within 1e-6.
     """
     array = _rows(name, x, 8)
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        raise NotFinite(name, tuple(int(k) for k in bad[0]))
-    norms = np.linalg.norm(array[..., :4], axis=-1)
-    worst = np.abs(norms - 1.0).argmax() if norms.size else None
-    if worst is not None and abs(norms.flat[worst] - 1.0) > UNIT_TOLERANCE:
-        raise NotUnit(name, float(norms.flat[worst]))
-    slant = np.abs(np.sum(array[..., :4] * array[..., 4:], axis=-1))
-    if slant.size and slant.max() > UNIT_TOLERANCE * (1.0 + np.abs(array[..., 4:]).max()):
+    rows = _flat(array, array.shape[:-1], 8)
+    worst, off, slant, farthest = _worst_rows(rows)
+    if math.isnan(off):
+        bad = np.argwhere(~np.isfinite(array))[0]
+        raise NotFinite(name, tuple(int(k) for k in bad))
+    if off > UNIT_TOLERANCE:
+        raise NotUnit(name, float(np.linalg.norm(rows[worst, :4])))
+    if slant > UNIT_TOLERANCE * (1.0 + farthest):
         what = f"{name}, whose dual part is not orthogonal to its primary part,"
-        raise NotUnit(what, float(np.sqrt(1 + slant.max())))
-    off = (np.abs(norms - 1.0) > ON_MANIFOLD) | (slant > ON_MANIFOLD)
-    return np.where(off[..., None], normalized(array), array) if off.any() else array
+        raise NotUnit(what, float(np.sqrt(1 + slant)))
+    if off <= ON_MANIFOLD and slant <= ON_MANIFOLD:
+        return array
+    out = rows.copy()
+    _project_rows(out)
+    return out.reshape(array.shape)
 
 
 def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:

@@ -13,14 +13,16 @@ from numpy.typing import ArrayLike
 
 from ..arrays import numbers
 from ..errors import BadShape, NotFinite
+from ..resumable import Resumable
 from ..robot.arm import Arm
 from ..robot.kinematics import FRAME, forward_into
+from .joint_paths import JointPaths
 from .joint_space_motion import timed_on_lines
-from .joint_space_rrt import connect, joint_edge_is_clear, shortcut
+from .joint_space_rrt import joint_edge_is_clear
 from .planning_scene import PlanningScene
 
 if TYPE_CHECKING:
-    from .settings import JointSearchSettings, PlanSettings
+    from .settings import PlanSettings
 
 CLOSE = 0.1
 """Largest distance [rad or m] of any joint from the goal at which a path of the tool is said to end there."""
@@ -65,7 +67,7 @@ def line_to(
 
 def plan_to_joints(
     arm: Arm, scene: PlanningScene, q: np.ndarray, goal: np.ndarray, settings: PlanSettings, seed: int
-) -> np.ndarray | None:
+) -> Resumable[np.ndarray | None]:
     """Search a motion to goal joints, from rest to rest on straight lines; None without success.
 
     Args:
@@ -81,22 +83,11 @@ def plan_to_joints(
     """
     search = settings.search
     assert search is not None
-    points = _connected(scene, q, goal, search, seed)
-    return None if points is None else _timed(arm, points, settings)
-
-
-def _connected(
-    scene: PlanningScene, q: np.ndarray, goal: np.ndarray, search: JointSearchSettings, seed: int
-) -> np.ndarray | None:
-    """Return the points (n, dof) of a clear path with shortcuts."""
-    dof, state = len(q), np.array([float(seed % 2147483646) + 1.0])
-    trees, parents = np.empty((2, search.nodes, dof)), np.empty((2, search.nodes))
-    out, ends = np.empty((2 * search.nodes, dof)), np.empty((2, dof))
-    seen = scene.with_contacts_as_at(q, goal)
+    seen, paths = scene.with_contacts_as_at(q, goal), JointPaths(len(q), search.nodes, seed)
     for _ in range(search.to_joints):  # the state of the random numbers is another each time
-        count = connect(seen, q, goal, trees, parents, search.step, search.iterations, state, out)
-        if count:
-            return out[: shortcut(seen, out, count, search.shortcuts_to_joints, state, ends)].copy()
+        points = yield from paths.connected(seen, q, goal, search.step, search.iterations, search.shortcuts_to_joints)
+        if points is not None:
+            return _timed(arm, points, settings)
     return None
 
 

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..control.inverse_kinematics import inverse_kinematics
-from ..control.pursuit import ARRIVED, fresh_pursuit_state
+from ..control.pursuit import ARRIVED
 from ..geometry.pose import Pose, PosePath
 from ..imitation.tsia import guide_index, imitated_path
 from ..ranges import ticks_of
+from ..resumable import SOLVED, Resumable
 from ..robot.arm import Arm
-from ..safety.guarded_pursuit import guarded_roll_out
-from .joint_space_rrt import connect, sample_ranges, shortcut
+from ..safety.guarded_pursuit import roll_out
+from .joint_paths import JointPaths
+from .joint_space_rrt import sample_ranges
 from .planning_scene import PlanningScene
 
 if TYPE_CHECKING:
@@ -84,7 +86,7 @@ class NextMotionCheck(NamedTuple):
     path: PosePath
     required: bool
 
-    def is_feasible(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> bool:
+    def is_feasible(self, arm: Arm, work: np.ndarray, q: np.ndarray, settings: PlanSettings) -> Resumable[bool]:
         """Return whether the motion can be followed; a required one without leaving its path.
 
         Args:
@@ -93,7 +95,7 @@ class NextMotionCheck(NamedTuple):
             q: (dof,) joints at its start.
             settings: of the planner.
         """
-        joints, _ = _followed(self.scene, work, self.path, q, settings)
+        joints, _ = yield from _followed(self.scene, work, self.path, q, settings)
         return joints is not None and (not self.required or path_deviation(arm, joints, self.path.dqs) <= MAX_DEVIATION)
 
 
@@ -119,13 +121,15 @@ def path_deviation(arm: Arm, joints: np.ndarray, path: np.ndarray) -> float:
 
 
 class _Posture(NamedTuple):
+    """A clear posture on the imitated path: at first with the least cost that it can have, without a tail."""
+
     cost: float
     order: int
     q: np.ndarray
-    tail: np.ndarray
     path: PosePath
     guide: int
-    next_feasible: bool
+    tail: np.ndarray | None = None
+    next_feasible: bool = True
 
 
 def plan_joint_space(
@@ -140,7 +144,7 @@ def plan_joint_space(
     seed: int,
     *,
     must_keep: bool = False,
-) -> JointSpaceMotion | SearchFailure:
+) -> Resumable[JointSpaceMotion | SearchFailure]:
     """Search a path in joint space to the goal, imitating the end of the demonstration.
 
     Args:
@@ -160,30 +164,27 @@ def plan_joint_space(
     """
     search = settings.search
     assert search is not None
-    rng = np.random.default_rng(abs(seed))
-    state = np.array([float(seed % 2147483646) + 1.0])
-    trees, parents = np.empty((2, search.nodes, arm.dof)), np.empty((2, search.nodes))
-    out = np.empty((2 * search.nodes, arm.dof))
-    ends, failure = np.empty((2, arm.dof)), SearchFailure(IK_OR_LIMIT, "")
+    rng, paths = np.random.default_rng(abs(seed)), JointPaths(arm.dof, search.nodes, seed)
+    failure = SearchFailure(IK_OR_LIMIT, "")
     for turn in range(search.rounds):
         later = search.rounds - 1 - turn
         iterations = max(search.iterations // ROUND_SHRINK**later, min(MIN_ITERATIONS, search.iterations))
-        found, failure = _postures(
+        found, failure = yield from _postures(
             arm, scene, work, demonstrated, goal, q, settings, check, rng, search.seeds * 2**turn, must_keep
         )
         best, least = None, math.inf
-        for posture in sorted(found)[: search.postures]:
+        for posture in found:
             if posture.cost >= least:
                 break  # no path is shorter than the straight line
             seen = scene.with_contacts_as_at(q, posture.q)
-            count = connect(seen, q, posture.q, trees, parents, search.step, iterations, state, out)
-            if count:
-                count = shortcut(seen, out, count, search.shortcuts, state, ends)
-                cost = posture.cost + _length(out[:count]) - float(np.abs(posture.q - q).max())
+            points = yield from paths.connected(seen, q, posture.q, search.step, iterations, search.shortcuts)
+            if points is not None:
+                cost = posture.cost + _length(points) - float(np.abs(posture.q - q).max())
                 if cost < least:
-                    best, least = (out[:count].copy(), posture), cost
+                    best, least = (points, posture), cost
         if best is not None and (least < INFEASIBLE_COST or later == 0):
             points, posture = best
+            assert posture.tail is not None
             timed_joints = timed_on_lines(points, search.speed * arm.velocity_limits, settings.motion.dt)
             joints = np.vstack([timed_joints[:-1], posture.tail])
             if not scene.keeps_contacts(joints):
@@ -201,12 +202,38 @@ def _length(points: np.ndarray) -> float:
 
 def _postures(
     arm, scene, work, demonstrated, goal, q, settings, check, rng, seeds, must_keep
-) -> tuple[list[_Posture], SearchFailure]:
-    """Return clear postures on the imitated path from which the rest of it can be followed, with their costs.
+) -> Resumable[tuple[list[_Posture], SearchFailure]]:
+    """Return the best clear postures on the imitated path from which the rest of it can be followed, the best first.
 
-    And the failure that it would be if no path led to any of them.
+    And the failure that it would be if no path led to any of them. The rest is followed only from postures that can
+    still be among the best.
     """
-    search, found, collision, clear, deep = settings.search, [], None, 0, False
+    clear, collision = yield from _clear_postures(arm, scene, demonstrated, goal, q, settings, rng, seeds, must_keep)
+    search, found, deep = settings.search, [], False
+    for posture in sorted(clear):
+        if len(found) == search.postures and posture.cost >= found[-1].cost:
+            break
+        tail, margin = yield from _followed(scene, work, posture.path, posture.q, settings)
+        if tail is None:
+            continue
+        if not scene.keeps_contacts(np.vstack([q, tail])):
+            deep = True
+            continue
+        cost = posture.cost + (10.0 if margin < search.margin else 0.0)
+        next_feasible = check is None or (yield from check.is_feasible(arm, work, tail[-1], settings))
+        if not next_feasible:
+            assert check is not None
+            cost += INFEASIBLE_COST if check.required else 5.0
+        found = sorted([*found, posture._replace(cost=cost, tail=tail, next_feasible=next_feasible)])
+        found = found[: search.postures]
+    return found, _failure(scene, len(found), len(clear), collision, deep)
+
+
+def _clear_postures(
+    arm, scene, demonstrated, goal, q, settings, rng, seeds, must_keep
+) -> Resumable[tuple[list[_Posture], np.ndarray | None]]:
+    """Return the clear postures on the imitated path, each with its least cost; and the first in collision."""
+    search, found, collision = settings.search, [], None
     imitated = imitated_path(demonstrated, goal)
     first, last = guide_index(imitated, settings.motion.guide), len(imitated) - 1
     home, (low, high) = np.clip(q, arm.lower, arm.upper), sample_ranges(arm.lower, arm.upper, q)
@@ -214,31 +241,21 @@ def _postures(
     for index in sorted((indices - {last} or indices) if must_keep else indices):
         path = imitated[index:]
         near = inverse_kinematics(arm, path[0], home, iterations=150)
+        late = search.late * (index - first) / max(last - first, 1)
         for k in range(seeds):
             guess = home if k == 0 and seeds == search.seeds else rng.uniform(low, high)
             if k % 2 and near is not None:  # around the nearest posture the same elbow is found turned
                 guess = np.clip(near + rng.normal(0.0, SEED_SPREAD, arm.dof), low, high)
             solution = inverse_kinematics(arm, path[0], guess, iterations=150)
+            yield SOLVED
             if solution is None:
                 continue
             if scene.slack(solution) < 0.0:
                 collision = solution if collision is None else collision
                 continue
-            clear += 1
-            tail, margin = _followed(scene, work, path, solution, settings)
-            if tail is None:
-                continue
-            if not scene.keeps_contacts(np.vstack([q, tail])):
-                deep = True
-                continue
-            cost = float(np.abs(solution - q).max()) + (10.0 if margin < search.margin else 0.0)
-            cost += search.late * (index - first) / max(last - first, 1)
-            next_feasible = check is None or check.is_feasible(arm, work, tail[-1], settings)
-            if not next_feasible:
-                assert check is not None
-                cost += INFEASIBLE_COST if check.required else 5.0
-            found.append(_Posture(cost, len(found), solution, tail, path, index, next_feasible))
-    return found, _failure(scene, len(found), clear, collision, deep)
+            cost = float(np.abs(solution - q).max()) + late
+            found.append(_Posture(cost, len(found), solution, path, index))
+    return found, collision
 
 
 def _failure(scene: PlanningScene, found: int, clear: int, collision: np.ndarray | None, deep: bool) -> SearchFailure:
@@ -254,14 +271,12 @@ def _failure(scene: PlanningScene, found: int, clear: int, collision: np.ndarray
     return SearchFailure(IK_OR_LIMIT, "")
 
 
-def _followed(scene, work, path, q, settings) -> tuple[np.ndarray | None, float]:
+def _followed(scene, work, path, q, settings) -> Resumable[tuple[np.ndarray | None, float]]:
     """Joints of following a path from q among the obstacles, or None; and the smallest joint margin."""
-    dof, dt = len(q), settings.motion.dt
-    trace, pursuit_state = np.empty((ticks_of(settings.max_seconds, dt) + 1, dof)), fresh_pursuit_state()
-    status, last, margin, _ = guarded_roll_out(
-        work, scene.robot, path.dqs, q.copy(), dt, pursuit_state, np.empty(dof), np.empty(dof), trace, 0
-    )
-    return (trace[: last + 1].copy() if status == ARRIVED else None), margin
+    dt = settings.motion.dt
+    trace = np.empty((ticks_of(settings.max_seconds, dt) + 1, len(q)))
+    found = yield from roll_out(work, scene.robot, path.dqs, q, dt, trace)
+    return (found.joints.copy() if found.status == ARRIVED else None), found.margin
 
 
 def timed_on_lines(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarray:

@@ -20,6 +20,8 @@ from ..jit import inlined, inner, kernel
 
 SMALLEST = 1e-4
 """Length [m] below which a stretch that cannot be proven counts as blocked."""
+MIN_SAVING = 0.02
+"""Length [rad] that a shortcut must save: most of the time of a search went into proofs that saved nothing."""
 
 
 @inner
@@ -89,6 +91,7 @@ def joint_edge_is_clear(g, start, end):
             return False
     s = 0.0
     for _ in range(1000):
+        g[ROW.header, HEADER.proofs] += 1.0
         for i in range(n):
             at[i] = start[i] + s * (end[i] - start[i])
             part[i] = (1.0 - s) * (end[i] - start[i])
@@ -162,12 +165,6 @@ def _read_branch(tree, parents, row, out, at, back, n):
 
 
 @inlined
-def _changed(counts, k, value):
-    """The pair with another number in place k."""
-    return (value, counts[1]) if k == 0 else (counts[0], value)
-
-
-@inlined
 def sample_range(lower, upper, around):
     """Ends of the range in which a joint is sampled: its limits, or one turn within them where they are wider.
 
@@ -193,27 +190,33 @@ def sample_ranges(lower: np.ndarray, upper: np.ndarray, around: np.ndarray) -> t
 
 
 @kernel
-def connect(g, start, goal, trees, parents, step, iterations, state, out):
-    """Search a clear path in joint space; returns the number of its points, 0 if none was found.
+def connect(g, start, goal, trees, parents, step, first, last, counts, state, out):
+    """Search a clear path in joint space, or go on after a pause.
 
     Args:
         g: the robot among obstacles, see `robot_arrays`.
         start: (n,) joints [rad or m], the first point.
         goal: (n,) joints, the last point.
-        trees: (2, m, n) scratch.
+        trees: (2, m, n) scratch, left as it is after a pause.
         parents: (2, m) scratch.
         step: length of the longest edge [rad or m].
-        iterations: largest number of samples.
+        first: number of samples so far; 0: begin.
+        last: number of samples after which to pause.
+        counts: (2,) int64, numbers of nodes.
         state: (1,) of the random numbers.
         out: (>= 2 m, n) points of the path, the result.
+
+    Returns:
+        The number of points of the path; 0 if none was found so far, -1 if the trees are full.
     """
     n = len(start)
-    for i in range(n):
-        trees[0, 0, i], trees[1, 0, i] = start[i], goal[i]
-    parents[0, 0] = parents[1, 0] = -1
-    counts = (1, 1)
+    if first == 0:
+        for i in range(n):
+            trees[0, 0, i], trees[1, 0, i] = start[i], goal[i]
+        parents[0, 0] = parents[1, 0] = -1
+        counts[:] = 1
     sample = g[ROW.part, MAX_JOINTS : MAX_JOINTS + n]
-    for k in range(iterations):
+    for k in range(first, last):
         a, b = (0, 1) if k % 2 == 0 else (1, 0)
         for i in range(n):
             low, high = sample_range(g[ROW.lower, i], g[ROW.upper, i], 0.5 * (start[i] + goal[i]))
@@ -223,14 +226,13 @@ def connect(g, start, goal, trees, parents, step, iterations, state, out):
             for i in range(n):
                 sample[i] = trees[b, 0, i]
         before = counts[a]
-        counts = _changed(counts, a, _extend(g, trees[a], parents[a], before, sample, step, k < 2)[0])
+        counts[a] = _extend(g, trees[a], parents[a], before, sample, step, k < 2)[0]
         if counts[a] == before:
             continue
         if counts[a] == len(trees[a]) or counts[b] == len(trees[b]):
-            return 0
+            return -1
         target = trees[a, counts[a] - 1]
-        count, met = _extend(g, trees[b], parents[b], counts[b], target, step, True)
-        counts = _changed(counts, b, count)
+        counts[b], met = _extend(g, trees[b], parents[b], counts[b], target, step, True)
         if met:
             at = _read_branch(trees[0], parents[0], counts[0] - 1, out, 0, False, n)
             # the two trees share the point where they meet
@@ -256,6 +258,24 @@ def _moved(path, first, count, to):
     return to + n
 
 
+@inlined
+def _length(a, b):
+    """Length [rad] of a line, by the joint that moves most."""
+    longest = 0.0
+    for d in range(len(a)):
+        longest = max(longest, abs(b[d] - a[d]))
+    return longest
+
+
+@inner
+def _saved(path, i, j, ends):
+    """Length [rad] that a line between two points of a path saves; they lie behind its points i and j."""
+    length = _length(ends[0], path[i + 1]) + _length(path[j], ends[1])
+    for k in range(i + 1, j):
+        length += _length(path[k], path[k + 1])
+    return length - _length(ends[0], ends[1])
+
+
 @kernel
 def shortcut(g, path, count, tries, state, ends):
     """Replace stretches of a joint path by clear straight lines between random points of the path.
@@ -264,7 +284,7 @@ def shortcut(g, path, count, tries, state, ends):
         g: the robot among obstacles, see `robot_arrays`.
         path: (m, n) joints, the path in the first `count` rows; changed in place.
         count: number of its points.
-        tries: number of lines to try.
+        tries: number of lines to try; those that would save less than `MIN_SAVING` are not.
         state: (1,) of the random numbers.
         ends: (2, n) scratch.
 
@@ -281,7 +301,7 @@ def shortcut(g, path, count, tries, state, ends):
             continue
         _on_edge(path, i, s - i, ends[0])
         _on_edge(path, j, t - j, ends[1])
-        if joint_edge_is_clear(g, ends[0], ends[1]):
+        if _saved(path, i, j, ends) >= MIN_SAVING and joint_edge_is_clear(g, ends[0], ends[1]):
             count = _moved(path, j + 1, count, i + 3)
             for d in range(path.shape[1]):
                 path[i + 1, d], path[i + 2, d] = ends[0, d], ends[1, d]

@@ -39,6 +39,7 @@ from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
 from ..imitation.demonstration import Demonstration
 from ..log.motion_log import MotionLog
+from ..resumable import Resumable, finished
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..safety.robot_checks import checked_contacts
@@ -236,7 +237,7 @@ def check_success(plan: Plan, what: str) -> None:
 
 
 class MotionPlanner(ABC):
-    """Plans motions of one arm; a planner implements `answer`.
+    """Plans motions of one arm; a planner implements `answering`.
 
     Attributes:
         arm: the arm.
@@ -249,8 +250,17 @@ class MotionPlanner(ABC):
     settings: PlanSettings
 
     @abstractmethod
+    def answering(self, request: PlanRequest) -> Resumable[Plan]:
+        """Plan a motion in slices, see `planner.resumable`; a failed plan says why."""
+
     def answer(self, request: PlanRequest) -> Plan:
-        """Plan a motion; a failed plan says why."""
+        """Plan a motion; a failed plan says why.
+
+        Raises:
+            WrongType, BadShape, NotFinite, BadOption: a part of the request cannot be used, see `checked_request`.
+            UnknownName: `allowed` names a part or an obstacle that does not exist.
+        """
+        return finished(self.answering(request))
 
     def plan(
         self,

@@ -1,6 +1,6 @@
 """The kinematic planner: one demonstration, a start, a goal and obstacles in, joints for every tick out.
 
-First the whole closed loop in one compiled call (`plan_closed_loop`). Where that does not arrive: other guiding poses,
+First the whole closed loop (`closed_loop`). Where that does not arrive: other guiding poses,
 detours with other biases and less margin, and at last a search in joint space for a posture from which the rest of the
 demonstrated path can be followed. Every step of a successful plan is proven clear of all obstacles for the whole arm.
 Not in the paper, which plans for the end effector's point.
@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import checked_kind, checked_settings
 from ..control.arm_arrays import arm_arrays
-from ..control.pursuit import ARRIVED, fresh_pursuit_state
+from ..control.pursuit import ARRIVED
 from ..control.reachability import why_not_reached
 from ..escape.detour import ESCAPED
 from ..escape.repet import Corner
@@ -25,11 +25,12 @@ from ..escape.tree_arrays import OPTION
 from ..geometry.pose import Pose
 from ..imitation.tsia import imitated_path, imitated_share
 from ..ranges import ticks_of
+from ..resumable import SCENE, Resumable
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..robot.kinematics import FRAME, forward_into
 from .attempts import NOTHING_KEPT, Attempt, attempts, escape_detail
-from .closed_loop_motion import COUNT, Buffers, buffers, plan_closed_loop
+from .closed_loop_motion import COUNT, Buffers, ClosedLoop, buffers, closed_loop
 from .joint_goal import line_to, plan_to_joints, tool_path
 from .joint_space_motion import (
     DEEP_CONTACT,
@@ -40,7 +41,7 @@ from .joint_space_motion import (
     plan_joint_space,
 )
 from .plan import WHY, MotionPlanner, Plan, PlanRequest
-from .planning_scene import PlanningScene, SceneTemplate
+from .planning_scene import PlanningScene, scene_template
 from .requests import checked_request, reduced_request, unfit
 from .settings import PlanSettings
 
@@ -56,7 +57,7 @@ class _Run(NamedTuple):
 
 
 class Planner(MotionPlanner):
-    """Plans motions of one arm; its arrays are used again, so use one planner per thread.
+    """Plans motions of one arm; its arrays are used again: one planner per thread, one motion at a time.
 
     Args:
         arm: the arm.
@@ -71,7 +72,6 @@ class Planner(MotionPlanner):
         self._work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
         self._options: dict[Corner, np.ndarray] = {}
         self._buffers = self._room(2)
-        self._pursuit_state, self._wish, self._out = fresh_pursuit_state(), np.empty(arm.dof), np.empty(arm.dof)
 
     def hold(self, body: Body) -> None:
         """Use another body from now on: after an object was grasped or released.
@@ -80,11 +80,13 @@ class Planner(MotionPlanner):
             WrongType, BadModel: no body, or one of another arm.
         """
         settings = self.settings
-        self._template = SceneTemplate(self.arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
+        self._template = scene_template(
+            self.arm, checked_kind("body", body, Body), settings.safety, settings.motion.dt, settings.guard
+        )
         self.body = body
 
-    def answer(self, request: PlanRequest) -> Plan:
-        """Plan a motion; a failed plan says why.
+    def answering(self, request: PlanRequest) -> Resumable[Plan]:
+        """Plan a motion in slices; a failed plan says why.
 
         Raises:
             WrongType, BadShape, NotFinite, BadOption: a part of the request cannot be used, see `checked_request`.
@@ -93,10 +95,11 @@ class Planner(MotionPlanner):
         begun = time.perf_counter()
         asked = checked_request(request, self.arm)
         request, reduction = reduced_request(asked, max(self.settings.repet.longest, 2))
-        plan = self._answer(request)
+        yield SCENE
+        plan = yield from self._answer(request)
         return plan._replace(request=asked, reduction=reduction, seconds=time.perf_counter() - begun)
 
-    def _answer(self, request: PlanRequest) -> Plan:
+    def _answer(self, request: PlanRequest) -> Resumable[Plan]:
         """Plan a motion along paths that the work arrays have room for."""
         q = self.arm.checked(request.start)
         scene = PlanningScene(self._template, request.obstacles, self.settings.repet.distance, request.allowed)
@@ -110,10 +113,11 @@ class Planner(MotionPlanner):
         lead = leaving.dqs.copy() if leaving is not None else self._pose(q)[None]
         self._make_room(len(lead) + len(request.demonstrated))
         if not isinstance(to, Pose):
-            return self._to_joints(run, np.asarray(to), lead)._replace(tries=1)
-        best, tries = self._followed(run, lead, request.seed)
+            plan = yield from self._to_joints(run, np.asarray(to), lead)
+            return plan._replace(tries=1)
+        best, tries = yield from self._followed(run, lead, request.seed)
         if not (best.success and best.next_feasible and best.end_margin >= self.settings.end_margin and best.keeps):
-            best = self._searched(run, best, request.seed)
+            best = yield from self._searched(run, best, request.seed)
         if best.success and not best.keeps:
             best = self._failed(run, NOTHING_KEPT, f"found was: {best.how}", tried=True)
         if best.reason == IK_OR_LIMIT and not best.detail:
@@ -130,7 +134,7 @@ class Planner(MotionPlanner):
         settings = self.settings
         return buffers(settings.repet, self.arm.dof, ticks_of(settings.max_seconds, settings.motion.dt), given)
 
-    def _followed(self, run: _Run, lead: np.ndarray, seed: int) -> tuple[Plan, int]:
+    def _followed(self, run: _Run, lead: np.ndarray, seed: int) -> Resumable[tuple[Plan, int]]:
         """Return the first good plan of the closed loops, else the best of a few, else a failed one; and the tries."""
         escapes, best, extra, failed = [], None, self.settings.effort, None
         for attempt in attempts(self.settings, escapes):
@@ -138,14 +142,14 @@ class Planner(MotionPlanner):
                 if extra == 0:
                     break
                 extra -= 1
-            status, pursuit, margin = self._closed_loop(run, lead, attempt, seed)
+            status, pursuit, margin = yield from self._closed_loop(run, lead, attempt, seed)
             escapes.append(status)
             trace = self._buffers.trace[: self._buffers.counts[COUNT.last] + 1]
             arrived = pursuit == ARRIVED and self._is_straight()
             if arrived and run.scene.keeps_contacts(trace):
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
-                found = found._replace(next_feasible=self._next_is_feasible(run, found.joints[-1]))
+                found = found._replace(next_feasible=(yield from self._next_is_feasible(run, found.joints[-1])))
                 if self._is_good(found) or self.settings.effort == 0:
                     return found, len(escapes)
                 best = found if best is None else _better(best, found)
@@ -160,7 +164,7 @@ class Planner(MotionPlanner):
             best = self._failed(run, *failed, tried=True)
         return best, len(escapes)
 
-    def _searched(self, run: _Run, best: Plan, seed: int) -> Plan:
+    def _searched(self, run: _Run, best: Plan, seed: int) -> Resumable[Plan]:
         """Return the better of the given plan and a joint-space plan; without either, why the search failed."""
         settings = self.settings
         if settings.search is None or not settings.avoid or (best.success and best.keeps and settings.effort == 0):
@@ -168,7 +172,7 @@ class Planner(MotionPlanner):
         if best.success and best.next_feasible and best.keeps:
             rounds = min(settings.search.rounds, settings.effort)
             settings = replace(settings, search=replace(settings.search, rounds=rounds))
-        found = plan_joint_space(
+        found = yield from plan_joint_space(
             self.arm,
             run.scene,
             self._work,
@@ -196,19 +200,21 @@ class Planner(MotionPlanner):
         )
         return _better(best, plan) if best.success else plan
 
-    def _to_joints(self, run: _Run, goal: np.ndarray, lead: np.ndarray) -> Plan:
+    def _to_joints(self, run: _Run, goal: np.ndarray, lead: np.ndarray) -> Resumable[Plan]:
         """Return a plan to goal joints: along the demonstration if it ends beside them, else by a search."""
         settings, seed = self.settings, run.request.seed
         attempt = Attempt(settings.motion.guide, settings.biases[0], detours=False)
-        _, pursuit, margin = self._closed_loop(run, lead, attempt, seed)
+        _, pursuit, margin = yield from self._closed_loop(run, lead, attempt, seed)
         if pursuit == ARRIVED and self._is_straight():
             found = self._plan(run, "direct", margin, attempt)
             rest = line_to(self.arm, run.scene, found.joints[-1], goal, settings)
             if rest is not None:
                 found = found._replace(joints=np.vstack([found.joints, rest[1:]]))
-                return self._ended(run, found)
+                return (yield from self._ended(run, found))
         searches = settings.search.to_joints if settings.search is not None and settings.avoid else 0
-        joints = plan_to_joints(self.arm, run.scene, run.q, goal, settings, seed) if searches else None
+        joints = None
+        if searches:
+            joints = yield from plan_to_joints(self.arm, run.scene, run.q, goal, settings, seed)
         if joints is None:
             return self._failed(run, "no path to the goal joints", f"{searches} searches in joint space")
         plan = self._made(
@@ -220,12 +226,13 @@ class Planner(MotionPlanner):
             margin=0.0,
             imitated_share=0.0,
         )
-        return self._ended(run, plan)
+        return (yield from self._ended(run, plan))
 
-    def _ended(self, run: _Run, plan: Plan) -> Plan:
+    def _ended(self, run: _Run, plan: Plan) -> Resumable[Plan]:
         """Return the plan with its joint margin, and whether the next motion is possible from its end."""
         margins = np.minimum(plan.joints - self.arm.lower, self.arm.upper - plan.joints)
-        return plan._replace(margin=float(margins.min()), next_feasible=self._next_is_feasible(run, plan.joints[-1]))
+        feasible = yield from self._next_is_feasible(run, plan.joints[-1])
+        return plan._replace(margin=float(margins.min()), next_feasible=feasible)
 
     def _is_good(self, plan: Plan) -> bool:
         share, margin = self.settings.min_imitated_share, self.settings.end_margin
@@ -249,18 +256,18 @@ class Planner(MotionPlanner):
             scene = PlanningScene(self._template, request.obstacles, distance, next_motion.allowed)
         return NextMotionCheck(scene, next_motion.path, next_motion.required)
 
-    def _next_is_feasible(self, run: _Run, q: np.ndarray) -> bool:
+    def _next_is_feasible(self, run: _Run, q: np.ndarray) -> Resumable[bool]:
         """True if a required next motion can be followed from joints q."""
-        return (
-            run.check is None or not run.check.required or run.check.is_feasible(self.arm, self._work, q, self.settings)
-        )
+        if run.check is None or not run.check.required:
+            return True
+        return (yield from run.check.is_feasible(self.arm, self._work, q, self.settings))
 
     def _pose(self, q: np.ndarray) -> np.ndarray:
         out = np.empty(8)
         forward_into(self.arm.chain, q, np.empty((self.arm.dof, FRAME.width)), out)
         return out
 
-    def _closed_loop(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> tuple[int, int, float]:
+    def _closed_loop(self, run: _Run, lead: np.ndarray, attempt: Attempt, seed: int) -> Resumable[ClosedLoop]:
         b, motion, repet = self._buffers, self.settings.motion, self.settings.repet
         tool = run.scene.tool(attempt.factor)
         if attempt.bias not in self._options:
@@ -272,9 +279,9 @@ class Planner(MotionPlanner):
         if not (self.settings.avoid and attempt.detours):
             b.options[OPTION.rounds] = 0.0
         b.state[0] = float(seed % 2147483646) + 1.0
-        return plan_closed_loop(
-            self._work, run.scene.robot, tool, run.request.demonstrated.dqs, run.goal.dq, lead, run.q.copy(),
-            attempt.guide, self.settings.spacing, motion.dt, b, self._pursuit_state, self._wish, self._out,
+        return closed_loop(
+            self._work, run.scene.robot, tool, run.request.demonstrated.dqs, run.goal.dq, lead, run.q,
+            attempt.guide, self.settings.spacing, motion.dt, b,
         )  # fmt: skip
 
     def _plan(self, run: _Run, how: str, margin: float, attempt: Attempt) -> Plan:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -45,6 +46,8 @@ VELOCITY = slice(OBSTACLE.velocity, OBSTACLE.ball)
 """Columns of the velocity of an obstacle."""
 
 
+TEMPLATES = 16
+"""Number of arms with bodies whose arrays are kept: one motion is planned and followed by several planners."""
 CONTACT_ROOM = 0.005
 """Distance [m] by which a wanted contact may be deeper on the way than at the ends: edges are proven with some room."""
 ROUNDING = 1e-6
@@ -105,6 +108,20 @@ class SceneTemplate:
         self.tool = tool_arrays(body.tool(arm), nothing, hulls=body.tool_hulls(arm))
 
 
+@lru_cache(maxsize=TEMPLATES)
+def scene_template(arm: Arm, body: Body, safety: SafetySettings, dt: float, guard: bool) -> SceneTemplate:
+    """Return the arrays of an arm and its body, the same object for the same ones.
+
+    Args:
+        arm: the arm.
+        body: its capsules, held object included.
+        safety: settings of the safety layer.
+        dt: seconds per tick.
+        guard: False: the arm follows paths as if there were no obstacles.
+    """
+    return SceneTemplate(arm, body, safety, dt, guard=guard)
+
+
 class PlanningScene:
     """The arrays of an arm among obstacles: `robot` to follow paths, `seen` for queries, `tool(factor)` for the tool.
 
@@ -161,7 +178,7 @@ class PlanningScene:
         Raises:
             BadOption: there are too many obstacles.
         """
-        template = SceneTemplate(arm, body, settings.safety, settings.motion.dt, guard=settings.guard)
+        template = scene_template(arm, body, settings.safety, settings.motion.dt, settings.guard)
         return PlanningScene(template, checked_obstacles(obstacles), settings.repet.distance, allowed)
 
     def with_contacts_as_at(self, *ends: np.ndarray) -> np.ndarray:

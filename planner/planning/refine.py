@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike
 
 from ..collision.edge_certificates import is_clear
 from ..control.arm_arrays import arm_arrays
-from ..control.pursuit import ARRIVED, fresh_pursuit_state
+from ..control.pursuit import ARRIVED
 from ..errors import PlanFailed
 from ..geometry.pose import Pose, PosePath
 from ..geometry.smooth_path import smooth, thinned
 from ..ranges import check_range, ticks_of
-from ..safety.guarded_pursuit import guarded_roll_out
+from ..resumable import finished
+from ..safety.guarded_pursuit import roll_out
 from .joint_space_rrt import joint_edge_is_clear
 from .plan import Plan, check_success
 from .planning_scene import PlanningScene
@@ -57,19 +58,17 @@ def smoothed(plan: Plan, *, tolerance: float = SMOOTH_TOLERANCE) -> Plan:
     path = PosePath(arm.fk(start).dq[None]).joined(plan.path)
     curve = _clear_curve(path, scene, tolerance)
     work = arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed())
-    wish, out = np.empty((2, arm.dof))
     trace = np.empty((ticks_of(plan.settings.max_seconds, motion.dt) + 1, arm.dof))
-    status, last, margin, changed = guarded_roll_out(
-        work, scene.robot, curve.dqs, start, motion.dt, fresh_pursuit_state(), wish, out, trace, 0
-    )
-    if status != ARRIVED:
-        raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {last * motion.dt:.2f} s")
-    _check_contacts(scene, trace[: last + 1])
+    found = finished(roll_out(work, scene.robot, curve.dqs, start, motion.dt, trace))
+    if found.status != ARRIVED:
+        until = (len(found.joints) - 1) * motion.dt
+        raise PlanFailed("plan_failed", f"the arm does not follow the smooth path beyond {until:.2f} s")
+    _check_contacts(scene, found.joints)
     return plan._replace(
-        joints=trace[: last + 1].copy(),
+        joints=found.joints.copy(),
         path_poses=curve.dqs,
-        margin=float(margin),
-        changed=int(changed),
+        margin=float(found.margin),
+        changed=int(found.changed),
         refined=(*plan.refined, "smooth"),
     )
 

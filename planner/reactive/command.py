@@ -4,6 +4,7 @@
 |---|---|
 | following | the arm follows its path |
 | escaping | the arm follows a detour, or joints found by a search |
+| planning | the arm stands, and keeps clear of what moves, until a plan is found |
 | waiting | the arm stands, or nearly so, because a moving obstacle is in the way |
 | blocked | an obstacle comes closer than the arm can retreat; the command is the best possible |
 | done | the end is reached |
@@ -26,15 +27,15 @@ from ..planning.plan import WHY
 from ..planning.settings import PlanSettings
 from ..ranges import check_ranges
 
-FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED = (
-    "following", "escaping", "waiting", "blocked", "done", "failed",
+FOLLOWING, ESCAPING, PLANNING, WAITING, BLOCKED, DONE, FAILED = (
+    "following", "escaping", "planning", "waiting", "blocked", "done", "failed",
 )  # fmt: skip
 BLOCKING = (
     *(WHY[status] for status in (START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LIMIT)),
     "start in collision", "goal in collision", NO_CLEAR_POSTURE, NO_JOINT_PATH, DEEP_CONTACT, NOTHING_KEPT,
 )  # fmt: skip
 """Reasons of a failed plan that mean: an obstacle is in the way of the motion as demonstrated."""
-STATES = (FOLLOWING, ESCAPING, WAITING, BLOCKED, DONE, FAILED)
+STATES = (FOLLOWING, ESCAPING, PLANNING, WAITING, BLOCKED, DONE, FAILED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,8 @@ class ReactiveSettings:
         patience: seconds without progress after which the motion is planned anew, moving obstacles taken as static.
         give_up: seconds without progress in total after which the motion has failed.
         lead: seconds by which the safety layer sees moving obstacles ahead of time, for an arm that lags.
+        budget: cost [us] of the planning that is done in a tick, see `planner.resumable`; inf: a tick takes as long as
+            its plan does.
     """
 
     plan: PlanSettings = field(default_factory=PlanSettings)
@@ -54,11 +57,13 @@ class ReactiveSettings:
     patience: float = 1.5
     give_up: float = 40.0
     lead: float = 0.05
+    budget: float = 4000.0
 
     def __post_init__(self):
         checked_kind("plan", self.plan, PlanSettings)
         check_ranges(self, "[0, 60)", "horizon", "lead")
         check_ranges(self, "(0, inf)", "patience", "give_up")
+        check_ranges(self, "(0, inf]", "budget")
         if self.patience > self.give_up:
             raise BadOption("patience", f"need 0 < patience <= give_up, got {self.patience} and {self.give_up}")
 

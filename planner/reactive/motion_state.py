@@ -23,12 +23,12 @@ from ..geometry.pose import PosePath
 from ..planning.attempts import NOTHING_KEPT
 from ..planning.plan import NextMotion
 from ..planning.planning_scene import Tightest
+from ..resumable import Paced
 from .command import BLOCKING
+from .decision import Decision
 
 DECIDE = 0.2
 """Seconds for which a decision to go on, to wait or to go round holds."""
-WAITS = (0.25, 0.5, 1.0)
-"""Waiting times that are compared, as parts of the horizon."""
 HELD_BACK = 0.1
 """Share of the wanted speed below which an arm near a moving obstacle counts as waiting."""
 
@@ -67,6 +67,8 @@ class MotionState:
         line: (n, 8) path from the start's pose on, which the tool must not leave; None: not needed yet.
         waiting: the arm stands until a moving obstacle has passed.
         decision_left: seconds until going on, waiting and detours are compared again.
+        planned: the plan in the making, for which the arm stands; None: none.
+        decided: the decision in the making, during which the arm does as decided before; None: none.
     """
 
     nominal: PosePath
@@ -88,6 +90,8 @@ class MotionState:
     line: np.ndarray | None = None
     waiting: bool = False
     decision_left: float = 0.0
+    planned: Paced[None] | None = None
+    decided: Paced[Decision] | None = None
 
     def __post_init__(self):
         self.path = self.nominal
@@ -120,7 +124,7 @@ class MotionState:
 
     def _begin(self, path: PosePath) -> None:
         self.path, self.pursuit = path, fresh_pursuit_state()
-        self.waiting, self.decision_left = False, 0.0
+        self.waiting, self.decision_left, self.decided = False, 0.0, None
 
     def fail(self, reason: str, detail: str) -> None:
         """End the motion without success.

@@ -21,7 +21,8 @@ from ..control.pursuit import ARRIVED
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
 from ..geometry.shapes import OBSTACLE, Obstacle, moves
 from ..jit import kernel
-from ..safety.guarded_pursuit import guarded_tick
+from ..resumable import CALL, TICK, Resumable
+from ..safety.guarded_pursuit import SLICE, guarded_tick
 from ..safety.safety_layer import FREE, safe_velocity
 
 SAME_PLACE = 1e-3
@@ -53,8 +54,8 @@ class Prediction(NamedTuple):
 
 
 @kernel
-def roll_ahead(work, g, path, q, dt, pursuit_state, wait, ticks, wish, out):
-    """Follow a path from q among moving obstacles, after standing still for some ticks.
+def roll_ahead(work, g, path, q, dt, pursuit_state, wait, first, last, wish, out):
+    """Follow a path from q among moving obstacles, after standing still for some ticks, or go on after a pause.
 
     Args:
         work: arm, controller and pursuit, see `arm_arrays`.
@@ -64,31 +65,33 @@ def roll_ahead(work, g, path, q, dt, pursuit_state, wait, ticks, wish, out):
         dt: seconds per tick.
         pursuit_state: (4,) state of the pursuit.
         wait: ticks to stand still first, giving way.
-        ticks: number of ticks to look ahead.
+        first: number of ticks so far.
+        last: number of ticks after which to pause.
         wish: (dof,) scratch.
         out: (dof,) scratch.
 
     Returns:
-        (True if the tool arrives, ticks used, smallest slack [m], first tick that the safety layer changed or -1).
+        (True if the tool arrives, ticks used, smallest slack [m], first tick that the safety layer changed or -1),
+        the latter two since the pause.
     """
-    least, first = math.inf, -1
-    for k in range(ticks):
+    least, changed = math.inf, -1
+    for k in range(first, last):
         if k < wait:
             wish[:] = 0.0
             safety = safe_velocity(g, q, wish, dt, out)
         else:
             status, safety = guarded_tick(work, g, path, q, dt, pursuit_state, wish, out)
             if status == ARRIVED:
-                return True, k, least, first
+                return True, k, least, changed
         least = min(least, near_pair_slack(g, -1, 0.0))
-        if safety != FREE and first < 0:
-            first = k
+        if safety != FREE and changed < 0:
+            changed = k
         for i in range(len(q)):
             q[i] += dt * out[i]
         for o in range(ROW.obstacles, ROW.obstacles + int(g[ROW.header, HEADER.obstacles])):
             for c in range(3):
                 g[o, OBSTACLE.center + c] += dt * g[o, OBSTACLE.velocity + c]
-    return False, ticks, least, first
+    return False, last, least, changed
 
 
 class Predictor:
@@ -106,7 +109,7 @@ class Predictor:
 
     def ahead(
         self, robot: np.ndarray, path: PosePath, pursuit_state: np.ndarray, q: np.ndarray, wait: float = 0.0
-    ) -> Prediction:
+    ) -> Resumable[Prediction]:
         """Predict the outcome of following a path after a wait.
 
         Args:
@@ -117,15 +120,21 @@ class Predictor:
             wait: seconds to stand still first.
         """
         g, end, after, before = robot.copy(), q.copy(), pursuit_state.copy(), near_pair_slack(robot, -1, 0.0)
-        ticks, scratch = round(self._horizon / self._dt), np.empty((2, len(q)))
-        arrived, used, least, first = roll_ahead(
-            self._work, g, path.dqs, end, self._dt, after, round(wait / self._dt), ticks, scratch[0], scratch[1]
-        )
+        ticks, scratch, waits = round(self._horizon / self._dt), np.empty((2, len(q))), round(wait / self._dt)
+        arrived, used, slack, conflict = False, 0, math.inf, None
+        while not arrived and used < ticks:
+            begun = used
+            arrived, used, least, changed = roll_ahead(
+                self._work, g, path.dqs, end, self._dt, after, waits, begun, min(ticks, begun + SLICE), *scratch
+            )
+            slack = min(slack, least)
+            if changed >= 0 and conflict is None:
+                conflict = changed * self._dt
+            yield CALL + TICK * (used - begun)
         arrival = used * self._dt
         if not arrived:
             arrival += self._left(path, int(after[PURSUIT_STATE.reference]), end) / self._pace
-        conflict = None if first < 0 else first * self._dt
-        return Prediction(arrival, least, least >= min(before, 0.0) - CREEP_TOLERANCE, conflict)
+        return Prediction(arrival, slack, slack >= min(before, 0.0) - CREEP_TOLERANCE, conflict)
 
     def _left(self, path: PosePath, index: int, q: np.ndarray) -> float:
         """Path length [m] from the tool at joints q to a pose of the path and on to its end."""

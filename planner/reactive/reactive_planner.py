@@ -8,7 +8,7 @@ arm, failing with a reason.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,24 +17,25 @@ from numpy.typing import ArrayLike
 from ..arrays import checked_kind, checked_settings
 from ..collision.step_certificates import near_pair_slack
 from ..control.arm_arrays import ARM, PURSUIT_STATE, arm_arrays
-from ..control.pursuit import ARRIVED, fresh_pursuit_state
-from ..escape.repet import MAX_OBSTACLES
-from ..geometry.pose import Pose, PosePath, nearest
+from ..control.pursuit import ARRIVED
+from ..geometry.pose import PosePath, nearest
 from ..geometry.shapes import Obstacle, moves
 from ..imitation.reduction import reduced
 from ..planning.joint_space_motion import MAX_DEVIATION, path_deviation
-from ..planning.plan import NextMotion, Plan, check_success
+from ..planning.plan import NextMotion, Plan, PlanRequest, check_success
 from ..planning.planner import Planner
-from ..planning.planning_scene import PlanningScene, SceneTemplate, checked_obstacles
+from ..planning.planning_scene import PlanningScene, checked_obstacles, scene_template
+from ..resumable import Paced, Resumable
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..safety.guarded_pursuit import guarded_tick
 from ..safety.robot_checks import checked_contacts
 from ..safety.safety_layer import BLOCKED as UNSAFE
 from ..safety.safety_layer import FREE, safe_velocity
-from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, WAITING, Command, ReactiveSettings
-from .motion_state import DECIDE, HELD_BACK, WAITS, Mode, MotionState, pursuit_of, why_stalled
-from .prediction import Predictor, is_preferable, same_scene, swept, windows
+from .command import BLOCKED, DONE, ESCAPING, FAILED, FOLLOWING, PLANNING, WAITING, Command, ReactiveSettings
+from .decision import Situation, decide
+from .motion_state import DECIDE, HELD_BACK, Mode, MotionState, pursuit_of, why_stalled
+from .prediction import Predictor, same_scene
 
 
 class ReactivePlanner:
@@ -77,7 +78,7 @@ class ReactivePlanner:
         self.body = body
         self._quick.hold(body)
         plan = self.settings.plan
-        self._template = SceneTemplate(self.arm, body, plan.safety, plan.motion.dt, guard=plan.guard)
+        self._template = scene_template(self.arm, body, plan.safety, plan.motion.dt, plan.guard)
         self._bind()
 
     def see(self, obstacles: Sequence[Obstacle], allowed: Sequence[tuple[str, str]] = ()) -> None:
@@ -152,11 +153,20 @@ class ReactivePlanner:
         motion = self.motion
         if motion is None or motion.over:
             return self._stand_still(joints)
-        if motion.plan_now:
-            self._replan(joints, [o for o in self._obstacles if not moves(o)])
+        if motion.plan_now and motion.planned is None:
+            motion.plan_now = False
+            motion.planned = Paced(self._replan(joints.copy(), [o for o in self._obstacles if not moves(o)]))
+        if not self._is_planned(motion):
+            return self._stand(joints, PLANNING)
         if motion.mode is Mode.TRACKING:
             return self._track(motion, joints)
         return self._pursue(motion, joints)
+
+    def _is_planned(self, motion: MotionState) -> bool:
+        """Go on with the plan in the making; returns True if there is none any more."""
+        if motion.planned is not None and motion.planned.advance(self.settings.budget):
+            motion.planned = None
+        return motion.planned is None
 
     def _pursue(self, motion: MotionState, q: np.ndarray) -> Command:
         """One tick along a path."""
@@ -194,44 +204,22 @@ class ReactivePlanner:
         return self._waited(motion, q, self._command(ESCAPING, safety))
 
     def _decide(self, motion: MotionState, q: np.ndarray) -> None:
-        """Go on, wait, or go round moving obstacles: of the safe options the one that arrives first."""
-        motion.waiting, motion.decision_left = False, DECIDE
-        horizon, robot = self.settings.horizon, self._scene.robot
-        best = self._foresight.ahead(robot, motion.path, motion.pursuit, q)
-        if best.conflict is None:
+        """Go on deciding what to do about moving obstacles; meanwhile the arm does as decided before."""
+        if motion.decided is None:
+            rest = motion.nominal[self._now_at(motion, q) :]
+            now = Situation(
+                q.copy(), self._scene.robot.copy(), motion.path, motion.pursuit.copy(), rest, self._obstacles,
+                self._template, self._known_allowed, motion.detours, motion.tries,
+            )  # fmt: skip
+            motion.decided = Paced(decide(now, self._foresight, self._quick, self.settings.horizon))
+        if not motion.decided.advance(self.settings.budget):
             return
-        conflict, detour = best.conflict, None
-        for part in WAITS:
-            other = self._foresight.ahead(robot, motion.path, motion.pursuit, q, part * horizon)
-            if is_preferable(other, best):
-                best, motion.waiting = other, True
-        for plan in self._detours(motion, q, conflict) if motion.detours else ():
-            other = self._foresight.ahead(robot, plan.path, fresh_pursuit_state(), q)
-            if is_preferable(other, best):
-                best, detour, motion.waiting = other, plan, False
-        if detour is not None:
+        found, motion.decided = motion.decided.result, None
+        motion.waiting, motion.decision_left = found.waiting, DECIDE
+        if found.detour is not None:
             motion.reached = self._now_at(motion, q)
-            motion.pursue(detour.path, detour=True)
+            motion.pursue(found.detour.path, detour=True)
             motion.decision_left = DECIDE
-
-    def _detours(self, motion: MotionState, q: np.ndarray, conflict: float) -> Iterator[Plan]:
-        """Detours round the places where moving obstacles will be, passing before or behind them."""
-        rest = motion.nominal[self._now_at(motion, q) :]
-        still = [obstacle for obstacle in self._obstacles if not moves(obstacle)]
-        for start, end in windows(conflict, self.settings.horizon):
-            # an obstacle about to leave the arm or the goal alone: the roll-out shows whether it does in time
-            places = [place for place in swept(self._obstacles, start, end) if self._spares_ends(place, q, rest[-1])]
-            around = still + places
-            if len(around) <= MAX_OBSTACLES:
-                allowed = self._known_allowed(around)
-                plan = self._quick.plan(rest, q, rest[-1], around, allowed=allowed, seed=motion.tries)
-                if plan.how == "escape":
-                    yield plan
-
-    def _spares_ends(self, place: Obstacle, q: np.ndarray, goal: Pose) -> bool:
-        settings = self.settings.plan
-        alone = PlanningScene(self._template, [place], settings.repet.distance, self._known_allowed([place]))
-        return min(alone.slack(q), alone.tool_slack(goal)) > settings.repet.distance - settings.safety.distance
 
     def _goes_astray(self, motion: MotionState, q: np.ndarray, safety: int) -> bool:
         """True if the safety layer leads the tool away from its path, or from the line to its beginning."""
@@ -285,21 +273,20 @@ class ReactivePlanner:
             motion.tries += 1
             motion.pursuit[PURSUIT_STATE.waited] = 0.0
             if motion.detours:
-                self._replan(q, self._obstacles)
+                motion.planned = Paced(self._replan(q.copy(), self._obstacles))
+                self._is_planned(motion)
         return command
 
-    def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> None:
+    def _replan(self, q: np.ndarray, obstacles: Sequence[Obstacle]) -> Resumable[None]:
         """Lead the rest of the motion round obstacles taken to stand still; where that fails, the path stays."""
         motion = self.motion
         assert motion is not None
-        motion.plan_now = False
         motion.reached = self._now_at(motion, q)
         rest = motion.nominal[motion.reached :]
-        allowed = self._known_allowed(obstacles)
+        around, allowed = tuple(obstacles), tuple(self._known_allowed(obstacles))
         then, keep = motion.next_motion, motion.must_keep
-        plan = self._planner.plan(
-            rest, q, rest[-1], obstacles, allowed=allowed, next_motion=then, seed=motion.tries, must_keep=keep
-        )
+        request = PlanRequest(rest, q, rest[-1], around, allowed, None, then, motion.tries, keep)
+        plan = yield from self._planner.answering(request)
         motion.refusal = plan.reason, plan.detail
         if plan.success and plan.how == "joint search":
             motion.track(plan.joints, plan.path)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from math import inf
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ..imitation.tsia import final_path, imitated_path, screw_path
 from ..planning.joint_space_motion import plan_joint_space
 from ..planning.planning_scene import PlanningScene
 from ..planning.settings import JointSearchSettings, PlanSettings
+from ..resumable import finished
 from ..robot.arm import Arm
 from ..robot.body import BODY, Body
 from ..safety.safety_layer import SafetyLayer
@@ -49,7 +51,7 @@ def warm_up(arm: Arm, body: Body) -> None:
     point, path = Body(row[None], ("point",)), _upwards(arm.fk(q))
     _algebra(path.dqs)
     for seen in ((FAR,), (replace(FAR, velocity=SLOW),)):
-        _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT)), q, path, seen)
+        _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT, budget=inf)), q, path, seen)
     _search(arm, point, q)
     SafetyLayer((arm,), (point,), (FAR,), SHORT.motion.dt)(q, np.zeros(arm.dof))
     Controller(arm)(q, path[-1])
@@ -81,6 +83,8 @@ def _algebra(x: np.ndarray) -> None:
     for one in (x, x.copy()):
         dq.translation(one)
         dq.normalized(one)
+        dq.checked_unit(1.0000001 * one)
+        dq.checked_unit(one)
         dq.dq_from_twist(dq.twist_from_dq(one))
 
 
@@ -101,4 +105,4 @@ def _search(arm: Arm, point: Body, q: np.ndarray) -> None:
         PlanningScene.of(arm, point, (FAR,), SHORT),
         arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed()),
     )
-    plan_joint_space(arm, scene, work, PosePath(here.dq[None]), here, q, SHORT, None, 0)
+    finished(plan_joint_space(arm, scene, work, PosePath(here.dq[None]), here, q, SHORT, None, 0))

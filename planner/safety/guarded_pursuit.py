@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..collision.robot_arrays import ROW
 from ..control.arm_arrays import ARM
 from ..control.controller import tick
-from ..control.pursuit import FOLLOWING, STALLED, pursue
+from ..control.pursuit import FOLLOWING, STALLED, fresh_pursuit_state, pursue
 from ..jit import kernel
+from ..resumable import CALL, TICK, Resumable
 from .safety_layer import BLOCKED, FREE, safe_velocity
+
+SLICE = 32
+"""Ticks of a roll-out between two pauses."""
 
 
 @kernel
@@ -56,8 +62,8 @@ def guarded_tick(work, g, path, q, dt, pursuit_state, wish, out):
 
 
 @kernel
-def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, first):
-    """Follow a path among standing obstacles; every step of the trace is proven clear.
+def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, first, last):
+    """Follow a path among standing obstacles, or go on after a pause; every step of the trace is proven clear.
 
     Args:
         work: arm, controller and pursuit, see `arm_arrays`.
@@ -70,12 +76,14 @@ def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, firs
         out: (dof,) scratch.
         trace: (t, dof) joints at every tick, a result.
         first: first row of the trace to write.
+        last: row before which to pause.
 
     Returns:
-        (status, row of the last entry, smallest joint margin [rad], ticks that the safety layer changed).
+        (status, row of the last entry, smallest joint margin [rad], ticks that the safety layer changed), the latter
+        two since the pause; the status FOLLOWING if there is more to do, from the next row on.
     """
     margin, changed = np.inf, 0
-    for count in range(first, len(trace)):
+    for count in range(first, min(last, len(trace))):
         for i in range(len(q)):
             trace[count, i] = q[i]
             margin = min(margin, q[i] - work[ARM.lower, i], work[ARM.upper, i] - q[i])
@@ -87,4 +95,48 @@ def guarded_roll_out(work, g, path, q, dt, pursuit_state, wish, out, trace, firs
         for i in range(len(q)):
             # standing obstacles cannot hit a standing arm
             q[i] += dt * out[i] if safety != BLOCKED else 0.0
+    if last < len(trace):
+        return FOLLOWING, last - 1, margin, changed
     return STALLED, len(trace) - 1, margin, changed
+
+
+class GuardedRollOut(NamedTuple):
+    """A path that was followed.
+
+    Attributes:
+        status: of the pursuit, at the end.
+        joints: (t, dof) at every tick; a view of the array that was given.
+        margin: smallest joint margin [rad].
+        changed: ticks that the safety layer changed.
+    """
+
+    status: int
+    joints: np.ndarray
+    margin: float
+    changed: int
+
+
+def roll_out(
+    work: np.ndarray, g: np.ndarray, path: np.ndarray, q: np.ndarray, dt: float, trace: np.ndarray
+) -> Resumable[GuardedRollOut]:
+    """Follow a path among standing obstacles, see `guarded_roll_out`, in slices.
+
+    Args:
+        work: arm, controller and pursuit, see `arm_arrays`.
+        g: the arm among obstacles, see `robot_arrays`.
+        path: (n, 8) poses of the tcp.
+        q: (dof,) joints at the start.
+        dt: duration of a tick [s].
+        trace: (t, dof) scratch, in which the joints are left; its length limits that of the motion.
+    """
+    q, state, (wish, out) = q.copy(), fresh_pursuit_state(), np.empty((2, len(q)))
+    first, margin, changed = 0, np.inf, 0
+    while True:
+        status, last, least, more = guarded_roll_out(
+            work, g, path, q, dt, state, wish, out, trace, first, first + SLICE
+        )
+        margin, changed = min(margin, least), changed + more
+        yield CALL + TICK * (last + 1 - first)
+        if status != FOLLOWING:
+            return GuardedRollOut(status, trace[: last + 1], margin, changed)
+        first = last + 1
