@@ -15,7 +15,7 @@ T = TypeVar("T")
 Resumable = Generator[float, None, T]
 """A computation that yields the cost [us] of each slice and returns its result."""
 
-TICK, NODE, PROOF, SOLVED, SCENE, CALL = 10.0, 5.0, 6.5, 80.0, 300.0, 50.0
+TICK, NODE, PROOF, SOLVED, SCENE, CALL = 9.0, 2.5, 4.5, 70.0, 300.0, 30.0
 """Costs [us] of a tick of a roll-out, of a node of an escape tree, of a step of the proof of an edge in joint space, of
 an inverse kinematics, of laying out a scene, and of what surrounds a call."""
 
@@ -30,7 +30,7 @@ def finished(work: Resumable[T]) -> T:
 
 
 class Paced(Generic[T]):
-    """A computation that goes on by a budget at a time.
+    """A computation that is advanced by a budget at a time.
 
     Args:
         work: the computation.

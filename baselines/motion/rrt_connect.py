@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ...planner.collision.clearance import slack_at
-from ...planner.planning.joint_space_rrt import joint_edge_is_clear, sample_ranges, shortcut
 from ...planner.ranges import check_ranges
+from ...planner.search.joint_space_rrt import joint_edge_is_clear, sample_ranges, shortcut
 from ..extras import needed
 
 

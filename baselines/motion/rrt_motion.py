@@ -24,7 +24,7 @@ from ...planner import (
 from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.planning.joint_space_motion import SearchFailure
-from ...planner.planning.joint_space_rrt import sample_ranges
+from ...planner.search.joint_space_rrt import sample_ranges
 from ..extras import needed
 from .motion_method import NO_PATH, SCREW, Follower, MotionMethod, MotionPlanner, Relative
 from .rrt_connect import RrtSettings, joint_path, timed

@@ -13,12 +13,12 @@ from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.control.reachability import why_not_reached
 from ...planner.imitation.tsia import screw_path
 from ...planner.planning.joint_space_motion import SearchFailure
-from ...planner.planning.joint_space_rrt import sample_ranges
 from ...planner.planning.plan import MotionPlanner, pose_goal
 from ...planner.planning.planning_scene import PlanningScene, checked_obstacles, scene_template
 from ...planner.planning.requests import checked_request
 from ...planner.resumable import CALL, Resumable
 from ...planner.robot.joint_limits import within_limits
+from ...planner.search.joint_space_rrt import sample_ranges
 from .motion_method import JOINTS, NO_PATH
 from .rrt_connect import RrtSettings, joint_path, timed
 

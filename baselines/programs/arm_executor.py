@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import count
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,11 +27,12 @@ from ...planner import (
 from ...planner.errors import PlanFailed
 from ...planner.geometry.shapes import moves
 from ...planner.reactive.command import DONE, ESCAPING, FAILED
-from ...planner.resumable import Paced, Resumable
+from ...planner.resumable import Resumable
 from ...planner.robot.joint_limits import near_limit
 from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
 from ..policy import LabeledPath, Observation
 from .goal_choice import ChosenMotion, MotionChoice, choose, departure_path
+from .thought import T, Thought, thought
 from .world_model import WorldModel
 
 OPEN, CLOSE = -1.0, 1.0
@@ -43,10 +44,7 @@ OFF = 0.03
 """Height [m] above its support from which a lifted object may take a detour."""
 GLANCE = 5
 """Ticks between checks of the held object."""
-T = TypeVar("T")
 Actions = Iterator[np.ndarray]
-Thought = Generator[np.ndarray, None, T]
-"""Actions of standing still until a result is there."""
 
 
 class _Held(NamedTuple):
@@ -95,9 +93,8 @@ class ArmExecutor:
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
         self.observation, self.world_model = observation, world_model
         self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
-        self._gripper, self.empty, self._full = OPEN, body, arm.velocity_limits
+        self._gripper, self.empty, self._full, self._pace = OPEN, body, arm.velocity_limits, 1.0
         self._held: _Held | None = None
-        self._pace = 1.0
         self.drawn: list[LabeledPath] = []
         self._escape: list[np.ndarray] = []
         self.motion_method, self._planner = motion_method, motion_method.follower(arm, body, settings)
@@ -117,11 +114,9 @@ class ArmExecutor:
 
     def slow_down(self, pace: float) -> None:
         """Limit the joints to a fraction of their speed limits from now on; only between motions."""
-        if pace == self._pace:
-            return
-        self._pace = pace
-        self.arm = replace(self.arm, velocity_limits=pace * self._full)
-        self._planner = self.motion_method.follower(self.arm, self._planner.body, self._planner.settings)
+        if pace != self._pace:
+            self._pace, self.arm = pace, replace(self.arm, velocity_limits=pace * self._full)
+            self._planner = self.motion_method.follower(self.arm, self._planner.body, self._planner.settings)
 
     def hold(self, index: int, shape: Shape | Sequence[Obstacle], tcp_from_object: Pose) -> None:
         """Treat an object as part of the arm from now on, no longer as an obstacle.
@@ -171,11 +166,8 @@ class ArmExecutor:
         self.world_model.allow(contacts)
 
     def thought(self, work: Resumable[T]) -> Thought[T]:
-        """Stand still while a computation goes on, by a budget per tick; return its result."""
-        paced = Paced(work)
-        while not paced.advance(self._planner.settings.budget):
-            yield self.still()
-        return paced.result
+        """Stand still during a computation; return its result."""
+        return thought(work, self._planner.settings.budget, self.still)
 
     def choose(
         self, motion: MotionChoice, then: Callable[[int], MotionChoice] | None = None, *, search: bool = True
@@ -190,15 +182,13 @@ class ArmExecutor:
         Raises:
             PlanFailed: "blocked" or "ik_or_limit", no goal can be reached.
         """
-        plan = self._planner.settings.plan
-        plan = plan if search else replace(plan, search=None)
-        return self.thought(choose(self.arm, plan, self.q, motion, then, self.motion_method))
+        settings = self._planner.settings.plan if search else replace(self._planner.settings.plan, search=None)
+        return self.thought(choose(self.arm, settings, self.q, motion, then, self.motion_method))
 
     def is_clear(self, motion: MotionChoice) -> Thought[bool]:
         """Return whether the arm touches nothing, where it is, that it must not touch in a motion."""
-        plan, here = self._planner.settings.plan, self.arm.fk(self.q)
-        still = tuple(each for each in motion.obstacles if not moves(each))
-        planner = Planner(self.arm, motion.body, replace(plan, search=None, avoid=False))
+        here, still = self.arm.fk(self.q), tuple(each for each in motion.obstacles if not moves(each))
+        planner = Planner(self.arm, motion.body, replace(self._planner.settings.plan, search=None, avoid=False))
         path = PosePath(np.array([here.dq, here.dq]))
         found = yield from self.thought(planner.answering(PlanRequest(path, self.q, here, still, motion.allowed)))
         return found.reason != "start in collision"
@@ -245,8 +235,7 @@ class ArmExecutor:
             self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours, must_keep=must_keep)
         led = plan if plan is not None and plan.how == ESCAPE else None
         if led:
-            nominal = final_path(self.arm.fk(self.q), led.imitated, led.guide)
-            self.drawn.append(LabeledPath("final", "", nominal))
+            self.drawn.append(LabeledPath("final", "", final_path(self.arm.fk(self.q), led.imitated, led.guide)))
         for tick in count():
             if tick % GLANCE == 0:
                 self._mind_held()

@@ -25,6 +25,7 @@ from ...planner.skills.alike import standing
 from ...planner.skills.segments import RIM, anchored, lip_of
 from ..policy import LabeledPath
 from .dual_arm_executor import DualArmExecutor, DualArmRollOut, Paths
+from .thought import Thought
 
 if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings
@@ -98,7 +99,7 @@ class BimanualPourProgram:
         yield from hands.wait(self.settings.settle)
         held = [hands.held(k, k) for k in (SOURCE, TARGET)]
         hands.hold(held)
-        choice = self._chosen(held)
+        choice = yield from self._chosen(held)
         self.paths += [
             LabeledPath("final", name, path) for name, path in zip(("source", "target"), choice.forth, strict=True)
         ]
@@ -106,14 +107,14 @@ class BimanualPourProgram:
         yield from hands.wait(self.settings.drain)
         yield from hands.move(choice.back, SLOW)
 
-    def _chosen(self, held: list[Pose]) -> PourSwing:
+    def _chosen(self, held: list[Pose]) -> Thought[PourSwing]:
         """Return the first choice whose roll-out arrives clear of the joint limits, else the best that arrives."""
         best: tuple[float, PourSwing] | None = None
         failed = DualArmRollOut("ik_or_limit", self.hands.q, 0.0)
         choices = product(PLACES, POUR_YAWS, HOLDER_YAWS, SIDES)
         for _, (place, pour, holder, side) in zip(range(LEAST), choices, strict=False):
             choice = self._choice(held, np.array(place), pour, pour + side, holder)
-            result = self.hands.roll_out(choice.forth, SLOW)
+            result = yield from self.hands.thought(self.hands.roll_out(choice.forth, SLOW))
             if result.reason:
                 failed = result
             elif result.margin >= MARGIN:

@@ -19,17 +19,21 @@ from ...planner.collision.self_collision import pairs_of
 from ...planner.errors import PlanFailed
 from ...planner.geometry import dualquat as dq
 from ...planner.geometry.pose import METERS_PER_RADIAN
+from ...planner.resumable import Resumable
 from ...planner.safety.safety_layer import BLOCKED
 from ..motion.motion_method import MotionMethod
 from ..motion.settings import ProgramSettings
 from ..policy import LabeledPath, Observation
-from .world_model import TABLE, TABLE_MARGIN, obstacles_in
+from .thought import T, Thought, thought
+from .world_model import OBSTACLE_KEYS, TABLE, TABLE_MARGIN, obstacles_in
 
 CLOSE = 1.0
 WRIST = 3
 """Within one arm, only capsules at least this many joints apart are checked: across a wrist they are always close."""
 NEAR = 0.02
 """Distance [rad] of every joint to the next point of a joint-space path at which that point counts as reached."""
+SLICE, STEP = 8, 300.0
+"""Steps of a roll-out between two pauses, and the cost [us] of one, see `planner.resumable`."""
 Paths = tuple[PosePath, PosePath]
 
 
@@ -73,13 +77,13 @@ class DualArmExecutor:
             settings.safety,
             motion_method,
         )
-        self._guard = settings.guard
+        self._guard, self._budget = settings.guard, settings.reactive.budget
         self.observation, self.arms = observation, task.arms
         self.q = np.array(observation["joint_positions"], dtype=np.float64)
         self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies, apart=WRIST)
         self._fixed = tuple(replace(f, margin=TABLE_MARGIN) if f.name == TABLE else f for f in task.fixtures)
         self._controllers = [Controller(arm, settings.motion.controller) for arm in task.arms]
-        self._layer = self._renewed_layer()
+        self._rows, self._layer = np.zeros(0), self._renewed_layer()
 
     def held(self, arm: int, index: int) -> Pose:
         """Return the observed `tcp_from_object`.
@@ -147,8 +151,7 @@ class DualArmExecutor:
         """
         index, waited = 0, 0.0
         while index < len(paths[0]):
-            if len(obstacles_in(self.observation)):
-                self._layer = self._renewed_layer()
+            self._look()
             speeds, blocked = self._towards(paths, index)
             yield self._action(speeds)
             waited += self.settings.dt
@@ -165,28 +168,38 @@ class DualArmExecutor:
 
     def still(self) -> np.ndarray:
         """Return the action of standing still, or of retreating from approaching obstacles."""
-        if len(obstacles_in(self.observation)):
-            self._layer = self._renewed_layer()
+        self._look()
         return self._action(self._layer(self.q.ravel(), np.zeros(self.q.size)).velocity.reshape(self.q.shape))
 
-    def roll_out(self, paths: Paths, radius: float) -> DualArmRollOut:
-        """Predict the result of following two paths from now on, by kinematics alone; nothing is moved.
+    def roll_out(self, paths: Paths, radius: float) -> Resumable[DualArmRollOut]:
+        """Predict the result of following two paths from now on, by kinematics alone, in slices; nothing is moved.
 
         Args:
             paths: paths of the two tcps, equally many poses.
             radius: see `follow` [m].
         """
-        start, previous = self.q.copy(), self._layer.work[ROW.previous].copy()
-        margin, reason = np.inf, ""
-        try:
-            for _ in self.move(paths, radius):
-                margin = min(margin, *(arm.margin(q) for arm, q in zip(self.arms, self.q, strict=True)))
-        except PlanFailed as failure:
-            reason = failure.reason
-        end, self.q, self._layer.work[ROW.previous] = self.q, start, previous
+        margin, reason, steps = np.inf, "", self.move(paths, radius)
+        there, over = (self.q, self._renewed_layer()), False
+        there[1].work[ROW.previous] = self._layer.work[ROW.previous]
+        while not over:
+            here, (self.q, self._layer) = (self.q, self._layer), there
+            try:
+                for _ in range(SLICE):
+                    if next(steps, None) is None:
+                        over = True
+                        break
+                    margin = min(margin, *(arm.margin(q) for arm, q in zip(self.arms, self.q, strict=True)))
+            except PlanFailed as failure:
+                over, reason = True, failure.reason
+            there, (self.q, self._layer) = (self.q, self._layer), here
+            yield SLICE * STEP
         for controller in self._controllers:
             controller.reset()
-        return DualArmRollOut(reason, end, margin)
+        return DualArmRollOut(reason, there[0], margin)
+
+    def thought(self, work: Resumable[T]) -> Thought[T]:
+        """Stand still during a computation; return its result."""
+        return thought(work, self._budget, self.still)
 
     def _towards(self, paths: Paths, index: int) -> tuple[np.ndarray, bool]:
         """Return safe speeds (2, dof) towards a pose of each path, and whether an obstacle blocks them."""
@@ -209,6 +222,12 @@ class DualArmExecutor:
         normalized = np.clip(speeds / limits, -1.0, 1.0)
         self.q = self.q + self.settings.dt * normalized * limits
         return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
+
+    def _look(self) -> None:
+        """Make the safety layer anew where an obstacle has changed."""
+        rows = np.concatenate([self.observation[key].ravel() for key in OBSTACLE_KEYS])
+        if not np.array_equal(rows, self._rows):
+            self._rows, self._layer = rows, self._renewed_layer()
 
     def _seen(self) -> np.ndarray:
         """Return both arms among all obstacles, with or without guard."""

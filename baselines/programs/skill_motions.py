@@ -16,12 +16,13 @@ from ...planner.imitation.segmentation import resampled
 from ...planner.imitation.tsia import departure, ending, screw_path
 from ...planner.skills.alike import standing, turned_like
 from ...planner.skills.skill import START, TASK_GOAL, Pair, Phase, Skill
-from .arm_executor import ArmExecutor, Thought
+from .arm_executor import ArmExecutor
 from .goal_choice import Enough, MotionChoice
 from .postures import Postures
 from .skill_goals import Places, ends_alike, level_imitation, pairs_of, point_of
 from .skill_steps import AS_SHOWN, Transfer, Way
 from .task_skills import things_of
+from .thought import Thought
 from .world_model import OBJECT_MARGIN
 
 if TYPE_CHECKING:

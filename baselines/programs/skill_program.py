@@ -16,11 +16,12 @@ from ...planner.imitation.tsia import departure
 from ...planner.skills.skill import Phase, Skill
 from ...planner.skills.thing import touching
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor, Thought, parted
+from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor, parted
 from .goal_choice import ChosenMotion
 from .skill_motions import SkillMotions
 from .skill_steps import Transfer, Way, steps_of
 from .task_skills import things_of
+from .thought import Thought
 
 if TYPE_CHECKING:
     from ..motion.settings import ProgramSettings

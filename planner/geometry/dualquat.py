@@ -16,15 +16,25 @@ from numpy.typing import ArrayLike
 
 from ..arrays import broadcast_shape, checked_array, numbers
 from ..errors import BadShape, NotFinite, NotUnit
-from ..jit import inlined, kernel
 from . import screw
+from .dualquat_rows import (
+    ON_MANIFOLD,
+    exp_rows,
+    from_pose_rows,
+    mul_rows,
+    normalize_rows,
+    project_rows,
+    sclerp_rows,
+    translation_rows,
+    twist_rows,
+    worst_rows,
+)
 
 Array = np.ndarray
 CONJUGATE_8 = np.diag([1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0])
 CONJUGATE_8.flags.writeable = False
 UNIT_TOLERANCE = 1e-6
-ON_MANIFOLD = 1e-14
-"""Largest deviation from a unit dual quaternion that can only be rounding."""
+"""Deviation from a unit dual quaternion beyond which numbers are refused."""
 
 
 class ScrewParameters(NamedTuple):
@@ -65,90 +75,6 @@ def _flat(array: Array, shape: tuple[int, ...], width: int) -> Array:
     return np.ascontiguousarray(spread.reshape(-1, width))
 
 
-@kernel
-def _mul_rows(a, b, out):
-    for i in range(len(out)):
-        screw.store8(out, i, screw.mul(screw.load8(a, i), screw.load8(b, i)))
-
-
-@kernel
-def _sclerp_rows(a, b, tau, shortest, out):
-    for i in range(len(out)):
-        x = screw.load8(a, i)
-        z = screw.mul(screw.conj(x), screw.load8(b, i))
-        xi = screw.twist_of(z) if shortest else screw.twist_along(z)
-        screw.store8(out, i, screw.mul(x, screw.from_twist(screw.scaled(xi, tau[i]))))
-
-
-@kernel
-def _twist_rows(x, out):
-    for i in range(len(out)):
-        xi = screw.twist_of(screw.load8(x, i))
-        for k in range(6):
-            out[i, k] = xi[k]
-
-
-@kernel
-def _exp_rows(xi, out):
-    for i in range(len(out)):
-        t = (xi[i, 0], xi[i, 1], xi[i, 2], xi[i, 3], xi[i, 4], xi[i, 5])
-        screw.store8(out, i, screw.from_twist(t))
-
-
-@kernel
-def _normalize_rows(x, out):
-    for i in range(len(out)):
-        screw.store8(out, i, screw.normalized(screw.load8(x, i)))
-
-
-@inlined
-def _norm_and_slant(x, i):
-    """Norm of the primary part of a row, and the size of its product with the dual part."""
-    r = x[i, 0] * x[i, 0] + x[i, 1] * x[i, 1] + x[i, 2] * x[i, 2] + x[i, 3] * x[i, 3]
-    d = x[i, 0] * x[i, 4] + x[i, 1] * x[i, 5] + x[i, 2] * x[i, 6] + x[i, 3] * x[i, 7]
-    return math.sqrt(r), abs(d)
-
-
-@kernel
-def _worst_rows(x):
-    """Row farthest from the unit norm, by how much; largest product of the parts; largest dual number; or NaN."""
-    worst, off, slant, farthest = 0, 0.0, 0.0, 0.0
-    for i in range(len(x)):
-        for k in range(8):
-            if not math.isfinite(x[i, k]):
-                return i, math.nan, math.nan, math.nan
-        norm, product = _norm_and_slant(x, i)
-        if abs(norm - 1.0) > off:
-            worst, off = i, abs(norm - 1.0)
-        slant = max(slant, product)
-        for k in range(4, 8):
-            farthest = max(farthest, abs(x[i, k]))
-    return worst, off, slant, farthest
-
-
-@kernel
-def _project_rows(x):
-    """Project the rows to the manifold that are not on it."""
-    for i in range(len(x)):
-        norm, product = _norm_and_slant(x, i)
-        if abs(norm - 1.0) > ON_MANIFOLD or product > ON_MANIFOLD:
-            screw.store8(x, i, screw.normalized(screw.load8(x, i)))
-
-
-@kernel
-def _from_pose_rows(p, r, out):
-    for i in range(len(out)):
-        screw.store8(out, i, screw.from_pose((p[i, 0], p[i, 1], p[i, 2]), (r[i, 0], r[i, 1], r[i, 2], r[i, 3])))
-
-
-@kernel
-def _translation_rows(x, out):
-    for i in range(len(out)):
-        t = screw.translation(screw.load8(x, i))
-        for k in range(3):
-            out[i, k] = t[k]
-
-
 def _mapped(rows, x: ArrayLike, width_in: int, width_out: int, name: str) -> Array:
     array = _rows(name, x, width_in)
     out = np.empty((array.size // width_in, width_out))
@@ -166,7 +92,7 @@ def mul(a: ArrayLike, b: ArrayLike) -> Array:
     a, b = _rows("a", a, 8), _rows("b", b, 8)
     shape = broadcast_shape("a and b", a.shape[:-1], b.shape[:-1])
     out = np.empty((math.prod(shape), 8))
-    _mul_rows(_flat(a, shape, 8), _flat(b, shape, 8), out)
+    mul_rows(_flat(a, shape, 8), _flat(b, shape, 8), out)
     return out.reshape(*shape, 8)
 
 
@@ -177,7 +103,7 @@ def conj(x: ArrayLike) -> Array:
 
 def normalized(x: ArrayLike) -> Array:
     """Return the nearest unit dual quaternion (..., 8) of the same sign."""
-    return _mapped(_normalize_rows, x, 8, 8, "dual quaternion")
+    return _mapped(normalize_rows, x, 8, 8, "dual quaternion")
 
 
 def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
@@ -192,7 +118,7 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
     """
     array = _rows(name, x, 8)
     rows = _flat(array, array.shape[:-1], 8)
-    worst, off, slant, farthest = _worst_rows(rows)
+    worst, off, slant, farthest = worst_rows(rows)
     if math.isnan(off):
         bad = np.argwhere(~np.isfinite(array))[0]
         raise NotFinite(name, tuple(int(k) for k in bad))
@@ -204,7 +130,7 @@ def checked_unit(x: ArrayLike, name: str = "dual quaternion") -> Array:
     if off <= ON_MANIFOLD and slant <= ON_MANIFOLD:
         return array
     out = rows.copy()
-    _project_rows(out)
+    project_rows(out)
     return out.reshape(array.shape)
 
 
@@ -213,23 +139,23 @@ def from_position_quaternion(position: ArrayLike, wxyz: ArrayLike) -> Array:
     p, r = _rows("position", position, 3), _rows("quaternion", wxyz, 4)
     shape = broadcast_shape("position and quaternion", p.shape[:-1], r.shape[:-1])
     out = np.empty((math.prod(shape), 8))
-    _from_pose_rows(_flat(p, shape, 3), _flat(r, shape, 4), out)
+    from_pose_rows(_flat(p, shape, 3), _flat(r, shape, 4), out)
     return out.reshape(*shape, 8)
 
 
 def translation(x: ArrayLike) -> Array:
     """Return positions (..., 3) [m]; the sign of x does not matter."""
-    return _mapped(_translation_rows, x, 8, 3, "dual quaternion")
+    return _mapped(translation_rows, x, 8, 3, "dual quaternion")
 
 
 def twist_from_dq(x: ArrayLike) -> Array:
     """Return the body twist (..., 6), (v, omega), of the shortest screw motion to x in unit time (`pinocchio.log6`)."""
-    return _mapped(_twist_rows, x, 8, 6, "dual quaternion")
+    return _mapped(twist_rows, x, 8, 6, "dual quaternion")
 
 
 def dq_from_twist(twist: ArrayLike) -> Array:
     """Return the unit dual quaternion (..., 8) reached by a constant body twist (..., 6), (v, omega), in unit time."""
-    return _mapped(_exp_rows, twist, 6, 8, "twist")
+    return _mapped(exp_rows, twist, 6, 8, "twist")
 
 
 def log(x: ArrayLike) -> Array:
@@ -267,7 +193,7 @@ def sclerp(start: ArrayLike, end: ArrayLike, tau: ArrayLike, *, shortest: bool =
     shape = broadcast_shape("start, end and tau", a.shape[:-1], b.shape[:-1], t.shape)
     out = np.empty((math.prod(shape), 8))
     flat_tau = np.ascontiguousarray(np.broadcast_to(t, shape).reshape(-1))
-    _sclerp_rows(_flat(a, shape, 8), _flat(b, shape, 8), flat_tau, shortest, out)
+    sclerp_rows(_flat(a, shape, 8), _flat(b, shape, 8), flat_tau, shortest, out)
     return out.reshape(*shape, 8)
 
 

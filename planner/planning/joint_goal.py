@@ -16,9 +16,9 @@ from ..errors import BadShape, NotFinite
 from ..resumable import Resumable
 from ..robot.arm import Arm
 from ..robot.kinematics import FRAME, forward_into
-from .joint_paths import JointPaths
+from ..search.joint_paths import JointPaths
+from ..search.joint_space_rrt import joint_edge_is_clear
 from .joint_space_motion import timed_on_lines
-from .joint_space_rrt import joint_edge_is_clear
 from .planning_scene import PlanningScene
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from ..ranges import ticks_of
 from ..resumable import SOLVED, Resumable
 from ..robot.arm import Arm
 from ..safety.guarded_pursuit import roll_out
-from .joint_paths import JointPaths
-from .joint_space_rrt import sample_ranges
+from ..search.joint_paths import JointPaths
+from ..search.joint_space_rrt import sample_ranges
 from .planning_scene import PlanningScene
 
 if TYPE_CHECKING:

@@ -254,12 +254,7 @@ class MotionPlanner(ABC):
         """Plan a motion in slices, see `planner.resumable`; a failed plan says why."""
 
     def answer(self, request: PlanRequest) -> Plan:
-        """Plan a motion; a failed plan says why.
-
-        Raises:
-            WrongType, BadShape, NotFinite, BadOption: a part of the request cannot be used, see `checked_request`.
-            UnknownName: `allowed` names a part or an obstacle that does not exist.
-        """
+        """Plan a motion; a failed plan says why. Errors are those of `answering`."""
         return finished(self.answering(request))
 
     def plan(

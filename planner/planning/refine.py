@@ -20,7 +20,7 @@ from ..geometry.smooth_path import smooth, thinned
 from ..ranges import check_range, ticks_of
 from ..resumable import finished
 from ..safety.guarded_pursuit import roll_out
-from .joint_space_rrt import joint_edge_is_clear
+from ..search.joint_space_rrt import joint_edge_is_clear
 from .plan import Plan, check_success
 from .planning_scene import PlanningScene
 from .time_optimal import time_optimal

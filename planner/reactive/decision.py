@@ -25,7 +25,7 @@ WAITS = (0.25, 0.5, 1.0)
 
 
 class Situation(NamedTuple):
-    """What a decision is about, as it is when it begins.
+    """The subject of a decision, as it is when the decision begins.
 
     Attributes:
         q: (dof,) joints.

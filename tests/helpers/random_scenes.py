@@ -30,14 +30,15 @@ from onedemo.planner.imitation.segmentation import resampled, trimmed
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import Certificate, certify
 from onedemo.planner.log.motion_log import MotionLog
-from onedemo.planner.planning.joint_space_rrt import connect
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.settings import PlanSettings
+from onedemo.planner.resumable import finished
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import BODY, Body
 from onedemo.planner.robot.chain_readers import turn_z_to
+from onedemo.planner.search.joint_paths import JointPaths
 
 KINDS = ("convex", "clutter", "gap", "trap", "shelf", "held", "cage")
 SOLVABLE = KINDS[:-1]
@@ -242,16 +243,14 @@ def feasible(problem: Problem, postures: int = 20, iterations: int = 40_000) -> 
         return False
     arm, rng = panda()[0], np.random.default_rng(problem.seed)
     scene = PlanningScene.of(arm, problem.body, problem.obstacles, SETTINGS)
-    nodes, state = 20_000, np.ones(1)
-    trees, parents = np.empty((2, nodes, arm.dof)), np.empty((2, nodes))
-    out = np.empty((2 * nodes, arm.dof))
+    paths = JointPaths(arm.dof, 20_000, 0)
     for k in range(postures):
         goal = problem.posture
         if k > 0:
             goal = clear_posture(arm, scene, problem.goal, rng.uniform(arm.lower, arm.upper), rng, 1)
         if goal is None:
             continue
-        if connect(scene.robot, problem.start, goal, trees, parents, 0.3, iterations, state, out):
+        if finished(paths.connected(scene.robot, problem.start, goal, 0.3, iterations, 0)) is not None:
             return True
     return False
 

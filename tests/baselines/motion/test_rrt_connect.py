@@ -13,8 +13,8 @@ from onedemo.baselines.motion.rrt_planner import RrtPlanner
 from onedemo.baselines.paths_only import motion_planner
 from onedemo.planner.errors import BadOption
 from onedemo.planner.geometry.shapes import Box, Obstacle
-from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear
 from onedemo.planner.planning.planning_scene import PlanningScene
+from onedemo.planner.search.joint_space_rrt import joint_edge_is_clear
 
 pytest.importorskip("ompl")
 ARM, BODY, HOME = panda()

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from helpers.random_scenes import at, demonstrated, panda
 
-from onedemo.baselines.programs.goal_choice import MotionChoice, choose, departure_path
+from onedemo.baselines.programs import goal_choice
+from onedemo.baselines.programs.goal_choice import MotionChoice
 from onedemo.planner.errors import PlanFailed
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere
@@ -16,9 +17,18 @@ from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.settings import PlanSettings
+from onedemo.planner.resumable import finished
 
 SETTINGS = PlanSettings()
 PLACE = (0.0, 0.35, 1.0)
+
+
+def choose(*given):
+    return finished(goal_choice.choose(*given))
+
+
+def departure_path(*given):
+    return finished(goal_choice.departure_path(*given))
 
 
 def goals(count=4, place=PLACE):

@@ -179,12 +179,12 @@ def test_the_motion_that_a_person_showed_a_real_panda_pours(tmp_path):
 
 
 def test_what_tilts_a_full_glass_and_nothing_else_must_keep_some_of_the_demonstration(env, monkeypatch):
-    answer, go, allow, planned, followed = Planner.answer, ReactivePlanner.go, ArmExecutor.allow, set(), set()
+    answering, go, allow, planned, followed = Planner.answering, ReactivePlanner.go, ArmExecutor.allow, set(), set()
     tilts, wanted = ("held", "target"), []
 
     def answered(self, request):
         planned.add((tilts in request.allowed, request.must_keep))
-        return answer(self, request)
+        return answering(self, request)
 
     def allowed(self, contacts):
         wanted[:] = contacts
@@ -194,7 +194,7 @@ def test_what_tilts_a_full_glass_and_nothing_else_must_keep_some_of_the_demonstr
         followed.add((tilts in wanted, given.get("must_keep", False)))
         go(self, path, **given)
 
-    monkeypatch.setattr(Planner, "answer", answered)
+    monkeypatch.setattr(Planner, "answering", answered)
     monkeypatch.setattr(ArmExecutor, "allow", allowed)
     monkeypatch.setattr(ReactivePlanner, "go", gone)
     assert episode(env, "L0", 0).success

@@ -12,6 +12,7 @@ from onedemo.baselines.programs.goal_choice import MotionChoice
 from onedemo.baselines.programs.postures import Postures
 from onedemo.baselines.programs.skill_steps import AS_SHOWN, WAYS, Way
 from onedemo.planner.geometry.pose import Pose, PosePath
+from onedemo.planner.resumable import finished
 
 FAR = Pose.from_position_quaternion([3.0, 0.0, 1.0])
 
@@ -38,6 +39,6 @@ def test_goals_without_a_posture_are_left_out_unless_all_are():
     here, reach = arm.fk(home), Postures(arm, home).reach
     path = PosePath(np.array([here.dq, here.dq]))
     motion = MotionChoice("x", path, (FAR, here, FAR), None, ())
-    assert motion.candidates == [0, 1, 2]
-    assert motion._replace(reaches=reach).candidates == [1]
-    assert motion._replace(goals=(FAR, FAR), reaches=reach).candidates == [0]
+    assert finished(motion.candidates()) == [0, 1, 2]
+    assert finished(motion._replace(reaches=reach).candidates()) == [1]
+    assert finished(motion._replace(goals=(FAR, FAR), reaches=reach).candidates()) == [0]

@@ -27,12 +27,12 @@ from onedemo.planner.geometry import screw
 from onedemo.planner.geometry.convex_distance import PER_ROW, convex_distance
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Mesh, Obstacle, Sphere, core_of, pack
-from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import Body, Hull
 from onedemo.planner.robot.joint_frames import joint_frames, moved
 from onedemo.planner.safety.barrier import _lay_bounds
 from onedemo.planner.safety.safety_layer import SafetyLayer, SafetySettings
+from onedemo.planner.search.joint_space_rrt import joint_edge_is_clear
 
 seeds = st.integers(0, 10**6)
 lay_bounds = jit.numba.njit(error_model="numpy")(lambda g, q: _lay_bounds(g, q))

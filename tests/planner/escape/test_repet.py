@@ -40,7 +40,7 @@ from onedemo.planner.escape.repet import (
     escape_path,
     point_tool,
 )
-from onedemo.planner.escape.tree_arrays import NODE, OPTION, tree_arrays
+from onedemo.planner.escape.tree_arrays import GROWTH, NODE, OPTION, tree_arrays
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry import screw
 from onedemo.planner.geometry.pose import Pose, PosePath
@@ -437,11 +437,12 @@ def test_no_more_poses_are_written_than_there_is_room_for():
         status, count, _ = escape(
             tool_arrays(BALL, pack(wall), margin=settings.distance), path[:-1], len(ALONG), out[:-1], slacks[:-1],
             places[:-1], poses[:-1], branch[:-1], tree, cells, heap, options, np.ones(1), np.zeros((10, 3)),
+            np.zeros(GROWTH.width), np.inf,
         )  # fmt: skip
         assert (status, count) == (TOO_LONG, 0)
         for array in (path, out, slacks, places, poses, branch):
             assert (array[-1] == 7.0).all()
     assert escape(
         tool_arrays(BALL, pack(wall)), path[:3], 4, out, slacks, places, poses, branch, tree, cells, heap, options,
-        np.ones(1), np.zeros((10, 3)),
+        np.ones(1), np.zeros((10, 3)), np.zeros(GROWTH.width), np.inf,
     )[0] == TOO_LONG  # fmt: skip

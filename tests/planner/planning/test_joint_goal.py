@@ -17,15 +17,17 @@ from onedemo.planner.geometry.pose import PosePath
 from onedemo.planner.geometry.shapes import Obstacle, Sphere
 from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.joint_goal import MOST_POSES, tool_path
-from onedemo.planner.planning.joint_space_rrt import connect, joint_edge_is_clear, sample_range
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planner import Planner
 from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.refine import scene_of, smoothed, timed
 from onedemo.planner.planning.settings import JointSearchSettings, PlanSettings
+from onedemo.planner.resumable import finished
 from onedemo.planner.robot.arm import Arm
 from onedemo.planner.robot.body import BODY, Body
 from onedemo.planner.robot.joint_frames import joint_frames, moved
+from onedemo.planner.search.joint_paths import JointPaths
+from onedemo.planner.search.joint_space_rrt import joint_edge_is_clear, sample_range
 
 ENOUGH = 0.9
 """Share of random scenes that is solved: of some no other posture than the given one can be left."""
@@ -213,13 +215,11 @@ def test_the_search_meets_what_lies_behind_half_a_turn():
     goal[0], goal[5] = home[0] - 2.0, 3.3
     middle = arm.fk(np.array([home[0] - 1.0, *home[1:]])).position
     scene = PlanningScene.of(arm, body, [Obstacle(Sphere(0.08), at(middle))], PlanSettings())
-    nodes, state = 2000, np.ones(1)
-    out = np.empty((2 * nodes, 7))
     assert not joint_edge_is_clear(scene.seen, home, goal)
-    count = connect(scene.seen, home, goal, np.empty((2, nodes, 7)), np.empty((2, nodes)), 0.3, 2000, state, out)
-    assert count > 2
-    np.testing.assert_array_equal(out[count - 1], goal)
-    assert (out[:count] <= arm.upper).all() and (out[:count] >= arm.lower).all()
+    points = finished(JointPaths(7, 2000, 0).connected(scene.seen, home, goal, 0.3, 2000, 0))
+    assert points is not None and len(points) > 2
+    np.testing.assert_array_equal(points[-1], goal)
+    assert (points <= arm.upper).all() and (points >= arm.lower).all()
 
 
 # Effort

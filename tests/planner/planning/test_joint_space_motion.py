@@ -20,8 +20,8 @@ from onedemo.planner.planning.joint_space_motion import (
     path_deviation,
     timed_on_lines,
 )
-from onedemo.planner.planning.joint_space_rrt import joint_edge_is_clear, shortcut
 from onedemo.planner.planning.planning_scene import PlanningScene
+from onedemo.planner.search.joint_space_rrt import joint_edge_is_clear, shortcut
 
 # Ways through joint space
 

@@ -84,4 +84,4 @@ def test_every_planner_has_the_one_signature():
 
     kinds = below(MotionPlanner)
     assert len(kinds) == 4
-    assert all("plan" not in vars(kind) and "answer" in vars(kind) for kind in kinds)
+    assert all("plan" not in vars(kind) and "answering" in vars(kind) for kind in kinds)

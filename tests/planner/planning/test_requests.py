@@ -164,8 +164,17 @@ def test_a_plan_that_must_keep_some_of_the_demonstration_and_keeps_nothing_has_f
     assert plan.success and plan.keeps and planner.plan(path, HOME, GOAL, must_keep=True).success
     bare = plan._replace(imitated_share=0.0)
     assert bare.keeps and not bare._replace(request=plan.request._replace(must_keep=True)).keeps
-    monkeypatch.setattr(Planner, "_followed", lambda self, run, lead, seed: (bare._replace(request=run.request), 1))
-    monkeypatch.setattr(Planner, "_searched", lambda self, run, best, seed: best)
+
+    def followed(self, run, lead, seed):
+        yield 0.0
+        return bare._replace(request=run.request), 1
+
+    def searched(self, run, best, seed):
+        yield 0.0
+        return best
+
+    monkeypatch.setattr(Planner, "_followed", followed)
+    monkeypatch.setattr(Planner, "_searched", searched)
     assert planner.plan(path, HOME, GOAL).success
     failed = planner.plan(path, HOME, GOAL, must_keep=True)
     assert failed.reason == NOTHING_KEPT and failed.detail == "found was: direct" and not failed.success

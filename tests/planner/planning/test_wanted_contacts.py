@@ -15,6 +15,7 @@ from onedemo.planner.judge.certify import certify
 from onedemo.planner.planning.joint_space_motion import JointSpaceMotion, plan_joint_space
 from onedemo.planner.planning.plan import Plan
 from onedemo.planner.planning.planning_scene import CONTACT_ROOM, PlanningScene
+from onedemo.planner.resumable import finished
 
 ARM, BODY, _ = panda()
 
@@ -38,7 +39,7 @@ def test_the_way_to_an_imitated_path_keeps_clear_of_it_too(seed):
     motion = SETTINGS.motion
     work = arm_arrays(ARM, motion.controller.packed(), motion.pursuit.packed())
     path = screw_path(at([0.0, 0.0, 0.1]) @ pose, pose, 0.01)
-    found = plan_joint_space(ARM, scene, work, path, pose, start, SETTINGS, None, seed)
+    found = finished(plan_joint_space(ARM, scene, work, path, pose, start, SETTINGS, None, seed))
     assert isinstance(found, JointSpaceMotion)
     joined = next(k for k, q in enumerate(found.joints) if ARM.fk(q).distance_to(found.path[0])[0] < 0.002)
     strict = PlanningScene.of(ARM, BODY, [ball], SETTINGS)

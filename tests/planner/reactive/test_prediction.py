@@ -11,6 +11,7 @@ from helpers.random_scenes import at, base_gap
 
 from onedemo.planner.collision.clearance import slack_at
 from onedemo.planner.control.arm_arrays import arm_arrays
+from onedemo.planner.control.pursuit import fresh_pursuit_state
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Obstacle, Sphere, moves
 from onedemo.planner.imitation.tsia import screw_path
@@ -20,7 +21,8 @@ from onedemo.planner.planning.planning_scene import PlanningScene
 from onedemo.planner.planning.settings import PlanSettings
 from onedemo.planner.reactive.command import DONE, ESCAPING, FAILED, WAITING, ReactiveSettings
 from onedemo.planner.reactive.prediction import Predictor, same_scene, swept, windows
-from onedemo.planner.reactive.reactive_planner import ReactivePlanner, fresh_pursuit_state
+from onedemo.planner.reactive.reactive_planner import ReactivePlanner
+from onedemo.planner.resumable import finished
 from onedemo.planner.safety.safety_layer import safe_velocity
 
 DT = 0.02
@@ -192,16 +194,16 @@ def test_what_is_foreseen_comes_true():
     scene = PlanningScene.of(arm, body, [thing], settings.plan)
     safe_velocity(scene.robot, START, np.zeros(7), DT, np.empty(7))
     before, memory = scene.robot.copy(), fresh_pursuit_state()
-    ahead = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, sideways(), memory, START)
+    ahead = finished(Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, sideways(), memory, START))
     assert ahead.arrival == pytest.approx(DT * (len(commands) - 1), abs=1e-9)
     rooms = [command.slack for command in commands]
     assert ahead.slack == pytest.approx(min(rooms), abs=1e-6)
     # looking changes nothing
     np.testing.assert_array_equal(scene.robot, before)
     np.testing.assert_array_equal(memory, fresh_pursuit_state())
-    short = Predictor(work, DT, 0.5, 0.15).ahead(scene.robot, sideways(), memory, START)
+    short = finished(Predictor(work, DT, 0.5, 0.15).ahead(scene.robot, sideways(), memory, START))
     assert 0.5 < short.arrival < ahead.arrival + 1.0
-    later = Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, sideways(), memory, START, wait=5.0)
+    later = finished(Predictor(work, DT, 30.0, 0.15).ahead(scene.robot, sideways(), memory, START, wait=5.0))
     assert later.arrival > 5.0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from onedemo.planner.reactive.command import (
     ESCAPING,
     FAILED,
     FOLLOWING,
+    PLANNING,
     STATES,
     WAITING,
     ReactiveSettings,
@@ -96,9 +98,39 @@ def test_what_stands_in_the_way_is_led_round_and_nothing_is_touched():
 def test_what_appears_on_the_way_is_led_round_at_once():
     path = sideways()
     things = (ball(middle(path)),)
-    states, rooms, trace, _ = followed(path, lambda k: things if k >= 8 else ())
+    settings = ReactiveSettings(budget=math.inf)
+    states, rooms, trace, _ = followed(path, lambda k: things if k >= 8 else (), settings=settings)
     assert set(states[:8]) == {FOLLOWING} and states[8] == ESCAPING
     assert states[-1] == DONE and reached(path, trace[-1]) and rooms.min() >= -1e-9
+
+
+@pytest.mark.parametrize("budget", [200.0, 4000.0])
+def test_the_arm_stands_until_the_way_round_is_planned_by_a_budget_per_tick(budget):
+    path = sideways()
+    things = (ball(middle(path)),)
+    settings = ReactiveSettings(budget=budget)
+    states, rooms, trace, _ = followed(path, lambda k: things if k >= 8 else (), settings=settings)
+    planned = states.index(ESCAPING)
+    assert set(states[:8]) == {FOLLOWING} and set(states[8:planned]) == {PLANNING}
+    assert (trace[9:planned] == trace[9]).all()
+    assert states[-1] == DONE and reached(path, trace[-1]) and rooms.min() >= -1e-9
+
+
+def test_what_comes_near_while_a_way_is_planned_is_kept_away_from():
+    """The arm retreats from a ball that moves, without waiting for the plan round another one."""
+    path = sideways()
+    still, velocity = ball(middle(path)), np.array([0.0, 0.1, 0.0])
+    from_behind = path[0].position + np.array([0.0, -0.22, 0.0])
+
+    def world(k):
+        mover = Obstacle(
+            Sphere(0.03), Pose.from_position_quaternion(from_behind + DT * k * velocity), velocity, "mover"
+        )
+        return (still, mover) if k < 60 else (still,)
+
+    states, rooms, trace, _ = followed(path, world, settings=ReactiveSettings(budget=20.0), ticks=60)
+    assert set(states) == {PLANNING} and np.abs(trace[-1] - trace[0]).max() > 0.01
+    assert rooms.min() >= -1e-9
 
 
 def test_what_vanishes_is_no_longer_led_round():

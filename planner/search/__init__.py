@@ -1,0 +1,1 @@
+"""Search of clear paths in joint space."""
