@@ -186,7 +186,7 @@ class ArmExecutor:
         """Return whether the arm touches nothing, where it is, that it must not touch in a motion."""
         plan, here = self._planner.settings.plan, self.arm.fk(self.q)
         still = [each for each in motion.obstacles if not moves(each)]
-        planner = Planner(self.arm, motion.body, replace(plan, search=None, avoid=False))
+        planner = Planner(self.arm, motion.body, replace(plan, search=None, trees=False))
         found = planner.plan(PosePath(np.array([here.dq, here.dq])), self.q, here, still, allowed=motion.allowed)
         return found.reason != "start in collision"
 

@@ -252,9 +252,9 @@ def _choices(
     motion_method: MotionMethod, arm: Arm, settings: PlanSettings, q: np.ndarray, motion: MotionChoice
 ) -> Iterator[ChosenMotion]:
     """Yield a choice for every goal, each with the best choice of the next motion from there."""
-    quick = replace(settings, search=None)
+    given, quick = settings, replace(settings, search=None)
     if not motion.detours:
-        settings = replace(settings, avoid=False, max_deviation=MAX_DEVIATION)
+        settings = replace(settings, trees=False, search=None, max_deviation=MAX_DEVIATION)
     if not (motion.detours and motion.guided):
         settings = replace(settings, motion=replace(settings.motion, guide=0.0))
     planner, away = motion_method.planner(arm, motion.body, settings), departure_path(arm, settings, q, motion)
@@ -268,7 +268,7 @@ def _choices(
             _still(motion),
             allowed=motion.allowed,
             leaving=away,
-            next_motion=None if following is None else _beginning(following, goal, settings),
+            next_motion=None if following is None else _beginning(following, goal, given),
             must_keep=motion.must_keep,
         )
         choice = ChosenMotion(index, plan, away, motion=motion)
