@@ -8,7 +8,7 @@ from ..envs import TaskDescription
 from ..planner import Demonstration, PlanSettings, Pose, RepetSettings
 from ..planner.planning.settings import JointSearchSettings
 from .motion.motion_method import SCREW, MotionMethod
-from .motion.settings import ProgramSettings
+from .motion.settings import GUARDED, ProgramSettings
 from .program_policy import ProgramPolicy
 
 
@@ -22,12 +22,14 @@ class ScrewSettings(ProgramSettings):
         search: False: no RRT-Connect in joint space where nothing else leads to a goal. With neither trees nor search,
             obstacles are left to the safety layer.
         whole_arm: False: only the hand and the held object are checked, as in the paper.
+        hold: as in `ProgramSettings`, guarded by default.
     """
 
     repet: RepetSettings = field(default_factory=RepetSettings)
     trees: bool = field(default=True, metadata={"formerly": "avoid"})
     search: bool = field(default=True, metadata={"formerly": "avoid"})
     whole_arm: bool = True
+    hold: str = GUARDED
 
     @property
     def motion_method(self) -> MotionMethod:
