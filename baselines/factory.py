@@ -8,7 +8,8 @@ from functools import partial
 from typing import Any
 
 from ..configs import BadConfig
-from ..configs.dataclass_settings import settings_from
+from ..configs.dataclass_settings import settings_from, with_present_names
+from ..configs.run_config import present_method
 from ..envs import TaskDescription
 from ..planner import Demonstration, Pose
 from ..planner.errors import UnknownName
@@ -64,10 +65,12 @@ def _learned(
 
 POLICIES = {
     "screw": PolicyKind(ScrewSettings, ScrewPolicy),
-    "screw-no-repet": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False}),
+    "screw-trees-only": PolicyKind(ScrewSettings, ScrewPolicy, {"search": False}),
+    "screw-search-only": PolicyKind(ScrewSettings, ScrewPolicy, {"trees": False}),
+    "screw-guard-only": PolicyKind(ScrewSettings, ScrewPolicy, {"trees": False, "search": False}),
     "screw-no-guard": PolicyKind(ScrewSettings, ScrewPolicy, {"guard": False}),
     "screw-ee-only": PolicyKind(ScrewSettings, ScrewPolicy, {"whole_arm": False}),
-    "tsia": PolicyKind(ScrewSettings, ScrewPolicy, {"avoid": False, "guard": False}),
+    "tsia": PolicyKind(ScrewSettings, ScrewPolicy, {"trees": False, "search": False, "guard": False}),
     "decoupled": PolicyKind(DecoupledSettings, join=straight_path),
     "replay": PolicyKind(ReplaySettings, join=straight_path),
     "dmp-goal": PolicyKind(DmpGoalSettings, join=straight_path),
@@ -90,7 +93,7 @@ def make_policy(
     """Make a policy for a task.
 
     Args:
-        name: one of `POLICIES`, or a dotted path of your own, see `own_policy`.
+        name: one of `POLICIES` or its former name, or a dotted path of your own, see `own_policy`.
         task: `env.unwrapped.task`.
         demonstration: the ONE demonstration.
         settings: the policy's settings as nested mappings; a missing key keeps its default.
@@ -108,7 +111,7 @@ def make_policy(
             raise BadConfig("tool", name, OWN_TOOL)
         shown = demonstration if key_poses is None else sparse(demonstration, key_poses)
         return own_policy(name, task, shown, settings or {})
-    chosen, kind = settings_of(name, settings), POLICIES[name]
+    chosen, kind = settings_of(name, settings), POLICIES[present_method(name)]
     shown = demonstration if key_poses is None else sparse(demonstration, key_poses, kind.join)
     return kind.make(task, shown, chosen, tool)
 
@@ -117,14 +120,16 @@ def settings_of(name: str, settings: Mapping[str, Any] | None = None) -> Any:
     """Return the checked settings of a policy.
 
     Args:
-        name: one of `POLICIES`.
+        name: one of `POLICIES`, or its former name.
         settings: nested mappings; a missing key keeps its default.
 
     Raises:
         UnknownName: no such policy.
         BadConfig: an unknown key, a wrong type or a value out of range.
     """
-    if name not in POLICIES:
+    present = present_method(name)
+    if present not in POLICIES:
         raise UnknownName("policy", name, POLICIES)
-    kind = POLICIES[name]
-    return settings_from(kind.settings, {**kind.preset, **(settings or {})}, f"settings of {name!r}")
+    kind, source = POLICIES[present], f"settings of {name!r}"
+    given = with_present_names(kind.settings, settings or {}, source)
+    return settings_from(kind.settings, {**kind.preset, **given}, source)

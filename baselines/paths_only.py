@@ -76,7 +76,7 @@ def made_path(
     if isinstance(chosen, GeneratedMotionSettings):
         return chosen.generator.make(demonstrated, start, goal, guide, ToolObstacles(tool, obstacles)).path
     path = final_path(start, imitated, guide)
-    if not chosen.plan.avoid:
+    if not chosen.plan.trees:
         return path
     escape = escape_path(path, tool, obstacles, chosen.plan.repet)
     if not escape.found:

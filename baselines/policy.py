@@ -48,7 +48,13 @@ class PolicyReport:
 
 
 class Policy(Protocol):
-    """Any object with Stable-Baselines3's `predict`; `report(state)` is optional."""
+    """Any object with Stable-Baselines3's `predict`.
+
+    Two more methods are optional. `report(state)` returns a `PolicyReport`. `hold(observation, state)` is called with a
+    real clock, for each control step that begins before `predict` has answered, with the observation of that step and
+    the state of that answer, whose action is taken afterwards. It returns the action of the step; None, or no such
+    method, stands for a plain hold: zero speed, grippers unchanged.
+    """
 
     def predict(
         self,

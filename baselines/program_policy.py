@@ -11,7 +11,7 @@ from ..envs import TaskDescription
 from ..planner import Demonstration, MotionSettings, Pose
 from ..planner.errors import BadOption, PlanFailed
 from ..planner.skills.skill import SegmentedSkill
-from .motion.settings import ProgramSettings
+from .motion.settings import PLAIN, ProgramSettings
 from .motion.tool_frame import ToolFrameMotion
 from .policy import EpisodePolicy, Observation, PolicyReport
 from .programs.arm_executor import ArmExecutor
@@ -119,6 +119,19 @@ class ProgramPolicy(EpisodePolicy):
                 memory.ended = PolicyReport(True, failure.reason, failure.detail)
             memory.actions = None
         return memory.executor.still()
+
+    def hold(self, observation: Observation, state: tuple[Episode, ...]) -> np.ndarray | None:
+        """Return the action of a tick that begins while the next action is computed; None: a plain hold. See `Policy`.
+
+        Args:
+            observation: one observation, of this tick.
+            state: state returned by `predict`.
+        """
+        if self.settings.hold == PLAIN:
+            return None
+        executor = state[0].executor
+        executor.observation = observation
+        return executor.hold_still()
 
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
         """Return the report on the episode of one environment.

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 
 from ..envs import TaskDescription
 from ..planner import Demonstration, PlanSettings, Pose, RepetSettings
+from ..planner.planning.settings import JointSearchSettings
 from .motion.motion_method import SCREW, MotionMethod
-from .motion.settings import ProgramSettings
+from .motion.settings import GUARDED, ProgramSettings
 from .program_policy import ProgramPolicy
 
 
@@ -17,13 +18,18 @@ class ScrewSettings(ProgramSettings):
 
     Attributes:
         repet: settings of detours around obstacles; see `RepetSettings`.
-        avoid: False: no detours and no search in joint space, only the safety layer.
+        trees: False: no escape trees, so no detours of the tool around obstacles.
+        search: False: no RRT-Connect in joint space where nothing else leads to a goal. With neither trees nor search,
+            obstacles are left to the safety layer.
         whole_arm: False: only the hand and the held object are checked, as in the paper.
+        hold: as in `ProgramSettings`, guarded by default.
     """
 
     repet: RepetSettings = field(default_factory=RepetSettings)
-    avoid: bool = True
+    trees: bool = field(default=True, metadata={"formerly": "avoid"})
+    search: bool = field(default=True, metadata={"formerly": "avoid"})
     whole_arm: bool = True
+    hold: str = GUARDED
 
     @property
     def motion_method(self) -> MotionMethod:
@@ -33,8 +39,9 @@ class ScrewSettings(ProgramSettings):
     @property
     def plan(self) -> PlanSettings:
         """See `ProgramSettings`."""
+        search = JointSearchSettings() if self.search else None
         return PlanSettings(
-            motion=self.motion, repet=self.repet, safety=self.safety, avoid=self.avoid, guard=self.guard
+            motion=self.motion, repet=self.repet, safety=self.safety, search=search, trees=self.trees, guard=self.guard
         )
 
     def visible_part(self, task: TaskDescription) -> TaskDescription:

@@ -26,7 +26,9 @@ class Look:
 
 LOOKS = {
     "screw": Look("#0072b2", "o"),
-    "screw-no-repet": Look("#0072b2", "v", "--"),
+    "screw-trees-only": Look("#6699cc", "+", "--"),
+    "screw-search-only": Look("#222255", "x", "--"),
+    "screw-guard-only": Look("#0072b2", "v", "--"),
     "screw-no-guard": Look("#56b4e9", "^", "--"),
     "screw-ee-only": Look("#332288", "<", "--"),
     "tsia": Look("#88ccee", ">", "--"),

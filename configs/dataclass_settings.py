@@ -18,7 +18,7 @@ Settings = TypeVar("Settings")
 def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) -> Settings:
     """Read a settings dataclass, including nested ones, from mappings as parsed from YAML.
 
-    A field's former key (`metadata["formerly"]`) is accepted for the field.
+    Former keys are accepted, see `with_present_names`.
 
     Args:
         kind: dataclass to read.
@@ -28,7 +28,7 @@ def settings_from(kind: type[Settings], values: Mapping[str, Any], source: str) 
     Raises:
         BadConfig: an unknown key, a field given by both of its names, or a value that the field refuses.
     """
-    values = _with_new_names(kind, values, source, "")
+    values = with_present_names(kind, values, source)
     _refuse_unknown(kind, kind, values, source, "")
     try:
         return _adapter(kind).validate_python(dict(values), strict=False)
@@ -56,21 +56,39 @@ def _class_of(kind: Any) -> Any:
     return next((part for part in get_args(kind) if is_dataclass(part)), kind)
 
 
-def _with_new_names(kind: Any, values: Any, source: str, prefix: str) -> Any:
-    """Return the values under the present names of the fields."""
+def with_present_names(kind: Any, values: Any, source: str, prefix: str = "") -> Any:
+    """Return nested mappings with the present names of all fields.
+
+    A field's former key is its `metadata["formerly"]`; `metadata["values"]` are present values by former ones. A former
+    key of several fields is a switch that sets all of them.
+
+    Args:
+        kind: settings dataclass, or the type of any value.
+        values: values by field; what is no mapping, or not of a dataclass, is returned as it is.
+        source: name of the file, for messages.
+        prefix: dotted key of the mapping, with a dot at its end.
+
+    Raises:
+        BadConfig: a field is given by both of its names, or a switch is neither true nor false.
+    """
     kind = _class_of(kind)
     if not (is_dataclass(kind) and isinstance(values, Mapping)):
         return values
-    former = {field.metadata["formerly"]: field for field in fields(kind) if "formerly" in field.metadata}
     types, found = get_type_hints(kind), {}
     for key, value in values.items():
-        field = former.get(key)
-        name = field.name if field else key
-        if field and name in values:
-            raise BadConfig(source, f"{prefix}{key}", f"is the former name of {name}: write one of them")
-        if field and isinstance(value, str):
-            value = field.metadata.get("values", {}).get(value, value)
-        found[name] = _with_new_names(types.get(name), value, source, f"{prefix}{key}.")
+        renamed = [field for field in fields(kind) if field.metadata.get("formerly") == key]
+        if len(renamed) > 1 and not isinstance(value, bool):
+            now = " and ".join(field.name for field in renamed)
+            raise BadConfig(source, f"{prefix}{key}", f"is neither true nor false, got {value!r}; now it is {now}")
+        for field in renamed:
+            if field.name in values:
+                raise BadConfig(source, f"{prefix}{key}", f"is the former name of {field.name}: write one of them")
+            other = field.metadata.get("values", {}) if isinstance(value, str | bool) else {}
+            found[field.name] = with_present_names(
+                types[field.name], other.get(value, value), source, f"{prefix}{key}."
+            )
+        if not renamed:
+            found[key] = with_present_names(types.get(key), value, source, f"{prefix}{key}.")
     return found
 
 

@@ -23,6 +23,7 @@ from .run_config import (
     RunConfig,
     RunSettings,
     digest_of,
+    present_method,
     reason_of,
 )
 from .shipped_files import shipped_demonstrations
@@ -116,6 +117,7 @@ def grid_of(values: dict[str, Any], path: str | Path, overrides: list[str] | Non
         for key in changed:
             values["sweep"] = without(values["sweep"], key)
         values["sweep"] = dict(leaves(values["sweep"]))
+    values = _with_present_methods(values)
     for key in values:
         if key not in ALLOWED:
             raise BadConfig(_blame(path, changed, str(key)), str(key), unknown_key(str(key), ALLOWED))
@@ -143,6 +145,21 @@ def load_config(path: str | Path, overrides: list[str] | None = None) -> RunConf
 def _blame(path: str | Path, changed: tuple[str, ...], key: str) -> str | Path:
     first = key.split(".")[0]
     return COMMAND_LINE if first in {text.split(".")[0] for text in changed} else path
+
+
+def _with_present_methods(value: Any) -> Any:
+    """Return the content of a config with the present names of methods, in sweeps and conditions too."""
+    if isinstance(value, list):
+        return [_with_present_methods(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    inner = {key: each if key in ("settings", "env") else _with_present_methods(each) for key, each in value.items()}
+    named = inner.get("method")
+    if isinstance(named, str):
+        inner["method"] = present_method(named)
+    elif isinstance(named, list):
+        inner["method"] = [present_method(each) if isinstance(each, str) else each for each in named]
+    return inner
 
 
 def _unfolded(sweep: Mapping[str, Any], path: str | Path) -> dict[str, Any]:

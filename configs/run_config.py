@@ -13,6 +13,7 @@ from pydantic import (
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
+    field_validator,
     model_serializer,
     model_validator,
 )
@@ -31,8 +32,20 @@ IMPLIED: dict[str, dict[str, Any]] = {"S": {"key_poses": 6}, "T": {"tool": (0.1,
 """Values implied by a level where the cell gives none."""
 FAMILIES: dict[str, dict[str, str]] = {"robosuite": {"task": "Lift", "range": "D0"}}
 """Environments that are several tasks: the arguments that tell which, with their defaults."""
+RENAMED_METHODS = {"screw-no-repet": "screw-guard-only"}
+"""Present names of methods by former ones, which are read everywhere; digests and hashes stay those of former names."""
 LATER = ("key_poses", "tool", "contents")
 """Keys that are written, and part of the digest, only if they have a value."""
+
+
+def present_method(name: str) -> str:
+    """Return the present name of a method."""
+    return RENAMED_METHODS.get(name, name)
+
+
+def first_method(name: str) -> str:
+    """Return the name that a method had first, by which digests and hashes know it."""
+    return {present: former for former, present in RENAMED_METHODS.items()}.get(name, name)
 
 
 def digest_of(value: Any) -> str:
@@ -87,6 +100,11 @@ class RunConfig(BaseModel):
     settings: dict[str, Any] = Field(default_factory=dict)
     contents: Annotated[str, Field(pattern="^[0-9a-f]{12}$")] | None = None
 
+    @field_validator("method")
+    @classmethod
+    def _with_its_present_name(cls, method: str) -> str:
+        return present_method(method)
+
     @model_validator(mode="before")
     @classmethod
     def _with_what_the_level_implies(cls, values: Any) -> Any:
@@ -118,7 +136,8 @@ class RunConfig(BaseModel):
 
     def digest(self) -> str:
         """Return twelve hexadecimal digits of all values that affect the course of an episode: all but `BESIDE`."""
-        return digest_of(self.model_dump(mode="json", exclude=set(BESIDE)))
+        values = self.model_dump(mode="json", exclude=set(BESIDE))
+        return digest_of({**values, "method": first_method(self.method)})
 
 
 class Default(BaseModel):

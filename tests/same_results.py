@@ -30,7 +30,7 @@ JOINTS = {"control_mode": "joint_velocity", "reward": "sparse"}
 BIG, SMALL = ("stack", "pour", "shelve"), ("reach", "place_one", "tilt_pour", "insert_one")
 SHOWN = {"pour": "pour", "bimanual_pour": "pour", "tilt_pour": "pour", "shelve": "shelve", "insert_one": "shelve"}
 METHODS = ("tsia", "decoupled", "replay", "dmp-goal", "dmp-world", "potential", "rrt")
-ABLATIONS = ("screw-no-repet", "screw-no-guard", "screw-ee-only")
+ABLATIONS = ("screw-trees-only", "screw-search-only", "screw-guard-only", "screw-no-guard", "screw-ee-only")
 LEARNED = ("bc", "sac", "sac-demo")
 SCENES = ("free", "sphere", "shelf", "clutter", "wall_gap", "cage")
 

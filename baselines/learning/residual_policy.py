@@ -178,6 +178,15 @@ class ResidualPolicy(EpisodePolicy):
         notify(memory, self.screw.task, action, taken)
         return taken
 
+    def hold(self, observation: Observation, state: tuple[Episode, ...]) -> np.ndarray | None:
+        """See `ProgramPolicy`.
+
+        Args:
+            observation: one observation, of this tick.
+            state: state returned by `predict`.
+        """
+        return self.screw.hold(observation, state)
+
     def report(self, state: tuple[Episode, ...], index: int = 0) -> PolicyReport:
         """See `ProgramPolicy`."""
         return self.screw.report(state, index)

@@ -79,7 +79,7 @@ class GeneratedMotionSettings(ProgramSettings):
     @property
     def plan(self) -> PlanSettings:
         """See `ProgramSettings`."""
-        return PlanSettings(motion=self.motion, safety=self.safety, search=None, avoid=False, guard=self.guard)
+        return PlanSettings(motion=self.motion, safety=self.safety, search=None, trees=False, guard=self.guard)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class DecoupledSettings(GeneratedMotionSettings):
     def plan(self) -> PlanSettings:
         """See `ProgramSettings`."""
         motion = replace(self.motion, pursuit=replace(self.motion.pursuit, interpolation="decoupled"))
-        return PlanSettings(motion=motion, safety=self.safety, search=None, avoid=False, guard=self.guard)
+        return PlanSettings(motion=motion, safety=self.safety, search=None, trees=False, guard=self.guard)
 
 
 @dataclass(frozen=True, slots=True)

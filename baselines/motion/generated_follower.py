@@ -61,7 +61,7 @@ class GeneratedFollower(ReactivePlanner):
         self._task: _Generation | None = None
         self._generated: GeneratedPath | None = None
         self._outdated, self._age = False, 0.0
-        plan = replace(settings.plan, avoid=False, search=None)
+        plan = replace(settings.plan, trees=False, search=None)
         super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
 
     def go(

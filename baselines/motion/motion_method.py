@@ -77,6 +77,10 @@ class Follower(Protocol):
         """Return the command for joints q (dof,); see `ReactivePlanner.step`."""
         ...
 
+    def stand(self, q: ArrayLike) -> Command:
+        """Return the command of standing still during a motion at joints q (dof,); see `ReactivePlanner.stand`."""
+        ...
+
 
 class Relative(NamedTuple):
     """Motion of one hand in the frame of another.

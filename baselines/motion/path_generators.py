@@ -107,3 +107,15 @@ def straight_path(start: Pose, end: Pose, step: float) -> PosePath:
 
 def _turn(pose: Pose) -> np.ndarray:
     return dq.from_position_quaternion(np.zeros(3), pose.dq[:4])
+
+
+def parted(path: PosePath, distance: float) -> tuple[PosePath, PosePath | None]:
+    """Return the part of a path that is near its beginning, and the rest, if there is one.
+
+    Args:
+        path: the path.
+        distance: distance [m] from the beginning.
+    """
+    away = np.linalg.norm(path.positions - path.positions[0], axis=1) > distance
+    free = int(np.argmax(away)) if away.any() else len(path) - 1
+    return path[: free + 1], path[free:] if free < len(path) - 1 else None

@@ -44,7 +44,7 @@ class RrtFollower(ReactivePlanner):
 
     def __init__(self, arm: Arm, body: Body, settings: ReactiveSettings, sampling: RrtSettings):
         self._sampling, self._goal = sampling, None
-        plan = replace(settings.plan, avoid=False, search=None)
+        plan = replace(settings.plan, trees=False, search=None)
         super().__init__(arm, body, replace(settings, plan=plan, horizon=0.0))
 
     def go(
@@ -161,4 +161,4 @@ class RrtPolicySettings(ProgramSettings):
     @property
     def plan(self) -> PlanSettings:
         """See `ProgramSettings`."""
-        return PlanSettings(motion=self.motion, safety=self.safety, search=None, avoid=False, guard=self.guard)
+        return PlanSettings(motion=self.motion, safety=self.safety, search=None, trees=False, guard=self.guard)

@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 
 from ...envs import TaskDescription
 from ...planner import MotionSettings, PlanSettings, ReactiveSettings, SafetySettings
-from ...planner.ranges import check_ranges
+from ...planner.ranges import check_choice, check_ranges
 from .motion_method import MotionMethod
+
+GUARDED, PLAIN = "guarded", "plain"
+"""Values of `ProgramSettings.hold`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,8 @@ class ProgramSettings(ABC):
         open: seconds for opening the gripper.
         drain: seconds of holding a glass tilted.
         guard: True: the safety layer filters every command.
+        hold: with a real clock, what the arm does while its policy computes: "plain", it stands still; "guarded", it
+            stands still as far as the safety layer allows, and retreats from what comes too close.
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -40,10 +45,12 @@ class ProgramSettings(ABC):
     open: float = 0.3
     drain: float = 1.5
     guard: bool = True
+    hold: str = PLAIN
 
     def __post_init__(self):
         check_ranges(self, "(0, inf]", "resample", "trim")
         check_ranges(self, "[0, inf]", "release_height", "settle", "close", "open", "drain")
+        check_choice("hold", self.hold, (GUARDED, PLAIN))
 
     @property
     @abstractmethod

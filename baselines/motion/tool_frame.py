@@ -113,6 +113,10 @@ class ToolFrameFollower:
         """See `Follower`."""
         return self._follower.step(q)
 
+    def stand(self, q: ArrayLike) -> Command:
+        """See `Follower`."""
+        return self._follower.stand(q)
+
 
 class ToolFrameMotion:
     """A motion method applied in another frame of the hand.

@@ -30,6 +30,7 @@ from ...planner.reactive.command import DONE, ESCAPING, FAILED
 from ...planner.resumable import Resumable
 from ...planner.robot.joint_limits import near_limit
 from ..motion.motion_method import ESCAPE, PATH, SCREW, MotionMethod
+from ..motion.path_generators import parted
 from ..policy import LabeledPath, Observation
 from .goal_choice import ChosenMotion, MotionChoice, choose, departure_path
 from .thought import T, Thought, thought
@@ -73,6 +74,7 @@ class ArmExecutor:
 
     Attributes:
         q: (dof,) commanded joints [rad].
+        before: (dof,) commanded joints [rad] before the last action.
         empty: the body with an empty hand.
         observation: the latest; updated by the policy before each tick.
         drawn: paths for display: each finished detour that was not demonstrated, as commanded, and the final paths that
@@ -92,7 +94,7 @@ class ArmExecutor:
     ):
         self.arm, self.settings, self.index = arm, settings.plan.motion, index
         self.observation, self.world_model = observation, world_model
-        self.q = np.array(observation["joint_positions"][index], dtype=np.float64)
+        self.q = self.before = np.array(observation["joint_positions"][index], dtype=np.float64)
         self._gripper, self.empty, self._full, self._pace = OPEN, body, arm.velocity_limits, 1.0
         self._held: _Held | None = None
         self.drawn: list[LabeledPath] = []
@@ -188,7 +190,7 @@ class ArmExecutor:
     def is_clear(self, motion: MotionChoice) -> Thought[bool]:
         """Return whether the arm touches nothing, where it is, that it must not touch in a motion."""
         here, still = self.arm.fk(self.q), tuple(each for each in motion.obstacles if not moves(each))
-        planner = Planner(self.arm, motion.body, replace(self._planner.settings.plan, search=None, avoid=False))
+        planner = Planner(self.arm, motion.body, replace(self._planner.settings.plan, search=None, trees=False))
         path = PosePath(np.array([here.dq, here.dq]))
         found = yield from self.thought(planner.answering(PlanRequest(path, self.q, here, still, motion.allowed)))
         return found.reason != "start in collision"
@@ -305,23 +307,22 @@ class ArmExecutor:
         self._planner.stop()
         return self._action(self._planned().velocity)
 
-    def _planned(self) -> Command:
+    def hold_still(self) -> np.ndarray:
+        """Return the action of standing still or retreating before the last action is taken; see `Policy`."""
+        here = self.before
+        self._see()
+        action = self._action(self._planner.stand(here).velocity)
+        self.before = here + self.q - self.before
+        return action
+
+    def _see(self) -> None:
         self._planner.see(self.world_model.obstacles(self.observation), self.world_model.allowed)
+
+    def _planned(self) -> Command:
+        self._see()
         return self._planner.step(self.q)
 
     def _action(self, speeds: np.ndarray) -> np.ndarray:
         normalized = np.clip(speeds / self._full, -1.0, 1.0)
-        self.q = self.q + self.settings.dt * normalized * self._full
+        self.before, self.q = self.q, self.q + self.settings.dt * normalized * self._full
         return np.append(normalized, self._gripper)
-
-
-def parted(path: PosePath, distance: float) -> tuple[PosePath, PosePath | None]:
-    """Return the part of a path that is near its beginning, and the rest, if there is one.
-
-    Args:
-        path: the path.
-        distance: distance [m] from the beginning.
-    """
-    away = np.linalg.norm(path.positions - path.positions[0], axis=1) > distance
-    free = int(np.argmax(away)) if away.any() else len(path) - 1
-    return path[: free + 1], path[free:] if free < len(path) - 1 else None

@@ -62,6 +62,7 @@ class DualArmExecutor:
 
     Attributes:
         q: (2, dof) commanded joints [rad].
+        before: (2, dof) commanded joints [rad] before the last action.
         observation: the latest; updated by the policy before each tick.
         drawn: always empty, see `ArmExecutor`.
     """
@@ -79,7 +80,7 @@ class DualArmExecutor:
         )
         self._guard, self._budget = settings.guard, settings.reactive.budget
         self.observation, self.arms = observation, task.arms
-        self.q = np.array(observation["joint_positions"], dtype=np.float64)
+        self.q = self.before = np.array(observation["joint_positions"], dtype=np.float64)
         self._bodies, self._pairs = task.bodies, pairs_of(task.arms, task.bodies, apart=WRIST)
         self._fixed = tuple(replace(f, margin=TABLE_MARGIN) if f.name == TABLE else f for f in task.fixtures)
         self._controllers = [Controller(arm, settings.motion.controller) for arm in task.arms]
@@ -168,8 +169,19 @@ class DualArmExecutor:
 
     def still(self) -> np.ndarray:
         """Return the action of standing still, or of retreating from approaching obstacles."""
+        return self._action(self._standing(self.q))
+
+    def hold_still(self) -> np.ndarray:
+        """See `ArmExecutor`."""
+        here = self.before
+        action = self._action(self._standing(here))
+        self.before = here + self.q - self.before
+        return action
+
+    def _standing(self, q: np.ndarray) -> np.ndarray:
+        """Return safe speeds (2, dof) of standing still at joints (2, dof)."""
         self._look()
-        return self._action(self._layer(self.q.ravel(), np.zeros(self.q.size)).velocity.reshape(self.q.shape))
+        return self._layer(q.ravel(), np.zeros(q.size)).velocity.reshape(q.shape)
 
     def roll_out(self, paths: Paths, radius: float) -> Resumable[DualArmRollOut]:
         """Predict the result of following two paths from now on, by kinematics alone, in slices; nothing is moved.
@@ -220,7 +232,7 @@ class DualArmExecutor:
     def _action(self, speeds: np.ndarray) -> np.ndarray:
         limits = np.array([arm.velocity_limits for arm in self.arms])
         normalized = np.clip(speeds / limits, -1.0, 1.0)
-        self.q = self.q + self.settings.dt * normalized * limits
+        self.before, self.q = self.q, self.q + self.settings.dt * normalized * limits
         return np.column_stack([normalized, np.full(len(self.q), CLOSE)]).ravel()
 
     def _look(self) -> None:

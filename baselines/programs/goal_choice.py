@@ -274,9 +274,9 @@ def _best(
 
     Each comes with the best choice of the next motion from there.
     """
-    quick = replace(settings, search=None)
+    given, quick = settings, replace(settings, search=None)
     if not motion.detours:
-        settings = replace(settings, avoid=False, max_deviation=MAX_DEVIATION)
+        settings = replace(settings, trees=False, search=None, max_deviation=MAX_DEVIATION)
     if not (motion.detours and motion.guided):
         settings = replace(settings, motion=replace(settings.motion, guide=0.0))
     found: list[ChosenMotion] = []
@@ -292,7 +292,7 @@ def _best(
         goal = motion.goals[index]
         following = None if motion.then is None else motion.then(index)
         yield PREPARED
-        beginning = None if following is None else _beginning(following, goal, settings)
+        beginning = None if following is None else _beginning(following, goal, given)
         shown = motion.demonstrated[motion_method.skipped(motion.done) :]
         request = PlanRequest(shown, q, goal, _still(motion), motion.allowed, away, beginning, 0, motion.must_keep)
         plan = yield from planner.answering(request)

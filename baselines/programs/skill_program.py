@@ -15,8 +15,9 @@ from ...planner.geometry.pose import nearest
 from ...planner.imitation.tsia import departure
 from ...planner.skills.skill import Phase, Skill
 from ...planner.skills.thing import touching
+from ..motion.path_generators import parted
 from ..policy import LabeledPath
-from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor, parted
+from .arm_executor import CLOSE, OFF, OPEN, ArmExecutor
 from .goal_choice import ChosenMotion
 from .skill_motions import SkillMotions
 from .skill_steps import Transfer, Way, steps_of

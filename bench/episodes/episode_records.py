@@ -12,6 +12,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any
 
+from ...configs.run_config import first_method, present_method
 from ...planner.errors import OneDemoError
 from ..workers.dispatcher import HUNG, WORKER_DIED
 
@@ -109,12 +110,13 @@ def known_record(values: dict[str, Any]) -> EpisodeRecord:
     needed = {each.name for each in fields(EpisodeRecord) if each.default is each.default_factory is MISSING}
     if not needed <= set(values) <= names:
         raise ValueError(f"not the keys of a record: {sorted(set(values) ^ names)}")
-    return EpisodeRecord(**values)
+    return EpisodeRecord(**{**values, "method": present_method(str(values["method"]))})
 
 
 def result_of(record: EpisodeRecord) -> dict[str, Any]:
     """Return the fields of a record that do not differ from run to run."""
-    return {key: value for key, value in asdict(record).items() if key not in TIMINGS}
+    values = {key: value for key, value in asdict(record).items() if key not in TIMINGS}
+    return {**values, "method": first_method(record.method)}
 
 
 @contextmanager

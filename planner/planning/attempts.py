@@ -52,7 +52,7 @@ def attempts(settings: PlanSettings, escapes: list[int]) -> Iterator[Attempt]:
         yield Attempt(guide, first, early=True)
     if escapes[-1] in (FREE, ESCAPED):
         yield Attempt(later, first)
-    if not settings.avoid:
+    if not settings.trees:
         return
     yield Attempt(guide, first, settings.tight)
     if escapes[-1] == ESCAPED:

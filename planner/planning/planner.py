@@ -167,7 +167,7 @@ class Planner(MotionPlanner):
     def _searched(self, run: _Run, best: Plan, seed: int) -> Resumable[Plan]:
         """Return the better of the given plan and a joint-space plan; without either, why the search failed."""
         settings = self.settings
-        if settings.search is None or not settings.avoid or (best.success and best.keeps and settings.effort == 0):
+        if settings.search is None or (best.success and best.keeps and settings.effort == 0):
             return best
         if best.success and best.next_feasible and best.keeps:
             rounds = min(settings.search.rounds, settings.effort)
@@ -211,7 +211,7 @@ class Planner(MotionPlanner):
             if rest is not None:
                 found = found._replace(joints=np.vstack([found.joints, rest[1:]]))
                 return (yield from self._ended(run, found))
-        searches = settings.search.to_joints if settings.search is not None and settings.avoid else 0
+        searches = settings.search.to_joints if settings.search is not None else 0
         joints = None
         if searches:
             joints = yield from plan_to_joints(self.arm, run.scene, run.q, goal, settings, seed)
@@ -276,7 +276,7 @@ class Planner(MotionPlanner):
         b.options[OPTION.largest_margin] = run.scene.widest(attempt.factor)
         if attempt.early:
             b.options[OPTION.candidates] = 1.0
-        if not (self.settings.avoid and attempt.detours):
+        if not (self.settings.trees and attempt.detours):
             b.options[OPTION.rounds] = 0.0
         b.state[0] = float(seed % 2147483646) + 1.0
         return closed_loop(

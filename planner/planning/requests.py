@@ -98,8 +98,8 @@ def unfit(arm: Arm, scene: PlanningScene, request: PlanRequest, settings: PlanSe
         return "start beyond a joint limit", beyond
     if settings.guard and scene.slack(start) < 0.0:
         return "start in collision", str(scene.tightest(start))
-    # a planner with neither detours nor guard ignores obstacles
-    careful = settings.guard or settings.avoid
+    # a planner without detours, search and guard ignores obstacles
+    careful = settings.guard or settings.avoids
     if not isinstance(goal, Pose):
         if beyond := beyond_limit(arm, np.asarray(goal)):
             return "goal beyond a joint limit", beyond

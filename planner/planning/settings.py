@@ -46,7 +46,7 @@ class MotionSettings:
 
 @dataclass(frozen=True, slots=True)
 class JointSearchSettings:
-    """Settings of the search in joint space.
+    """Settings of the search in joint space, an RRT-Connect.
 
     Attributes:
         step: longest edge [rad].
@@ -98,7 +98,7 @@ class PlanSettings:
         motion: imitation, controller and pursuit.
         repet: settings of the escape trees.
         safety: settings of the layer that keeps the whole arm clear.
-        search: settings of the search in joint space; None: no search.
+        search: settings of the search in joint space, an RRT-Connect; None: no search.
         biases: biases of the detours, tried one after the other; see `RepetSettings.bias`.
         tight: factor of the planning margin in the second half of the tries.
         min_imitated_share: share of the imitated path behind the wanted guiding pose that a plan must follow to be
@@ -109,7 +109,7 @@ class PlanSettings:
             in joint space if the fallback ends near a joint limit; 0: the first plan is taken.
         spacing: path length [m] between poses of a blend.
         max_seconds: longest motion [s].
-        avoid: False: no detours and no search, the safety layer alone.
+        trees: False: no escape trees, so no detours of the tool. Without search too, the safety layer is alone.
         max_deviation: distance [m] by which the safety layer may lead the tool off its path.
         guard: False: no safety layer; a successful plan is then proven clear for the tool at most.
     """
@@ -117,7 +117,9 @@ class PlanSettings:
     motion: MotionSettings = field(default_factory=MotionSettings)
     repet: RepetSettings = field(default_factory=RepetSettings)
     safety: SafetySettings = field(default_factory=SafetySettings)
-    search: JointSearchSettings | None = field(default_factory=JointSearchSettings)
+    search: JointSearchSettings | None = field(
+        default_factory=JointSearchSettings, metadata={"formerly": "avoid", "values": {True: {}, False: None}}
+    )
     biases: tuple[Corner, ...] = BIASES
     tight: float = 0.7
     min_imitated_share: float = field(default=0.4, metadata={"formerly": "keep"})
@@ -125,7 +127,7 @@ class PlanSettings:
     effort: int = 3
     spacing: float = 0.01
     max_seconds: float = 30.0
-    avoid: bool = True
+    trees: bool = field(default=True, metadata={"formerly": "avoid"})
     max_deviation: float = field(default=math.inf, metadata={"formerly": "stray"})
     guard: bool = True
 
@@ -149,3 +151,8 @@ class PlanSettings:
         if self.repet.distance * self.tight < self.safety.distance:
             reason = f"{self.repet.distance} times {self.tight} is below the safety distance {self.safety.distance}"
             raise BadOption("repet.distance", reason)
+
+    @property
+    def avoids(self) -> bool:
+        """True if obstacles are led round at all, by escape trees or by the search in joint space."""
+        return self.trees or self.search is not None

@@ -157,7 +157,8 @@ class ReactivePlanner:
             motion.plan_now = False
             motion.planned = Paced(self._replan(joints.copy(), [o for o in self._obstacles if not moves(o)]))
         if not self._is_planned(motion):
-            return self._stand(joints, PLANNING)
+            command = self.stand(joints)
+            return command if command.state == BLOCKED else command._replace(state=PLANNING)
         if motion.mode is Mode.TRACKING:
             return self._track(motion, joints)
         return self._pursue(motion, joints)
@@ -178,13 +179,13 @@ class ReactivePlanner:
             motion.mode = Mode.DONE
             return self._stand_still(q)
         if not motion.detours and self._goes_astray(motion, q, safety):
-            return self._waited(motion, q, self._stand(q, WAITING))
+            return self._waited(motion, q, self.stand(q))
         if self._moving and self.settings.horizon > 0.0:
             motion.decision_left -= dt
             if motion.decision_left <= 0.0:
                 self._decide(motion, q)
             if motion.waiting:
-                return self._waited(motion, q, self._stand(q, WAITING))
+                return self._waited(motion, q, self.stand(q))
         state = ESCAPING if motion.mode is Mode.DETOURING else FOLLOWING
         return self._waited(motion, q, self._command(state, safety))
 
@@ -243,11 +244,11 @@ class ReactivePlanner:
             state = WAITING
         return Command(self._out.copy(), state, "", slack)
 
-    def _stand(self, q: np.ndarray, state: str) -> Command:
-        """The command of standing still during a motion, or of retreating from what comes too close."""
-        dt = self.settings.plan.motion.dt
-        command = self._command(state, safe_velocity(self._scene.robot, q, self._still, dt, self._out))
-        return command._replace(state=state) if command.state != BLOCKED else command
+    def stand(self, q: ArrayLike) -> Command:
+        """Return the command of standing still during a motion, or of retreating from what comes too close."""
+        joints, dt = self.arm.checked(q), self.settings.plan.motion.dt
+        command = self._command(WAITING, safe_velocity(self._scene.robot, joints, self._still, dt, self._out))
+        return command._replace(state=WAITING) if command.state != BLOCKED else command
 
     def _stand_still(self, q: np.ndarray) -> Command:
         """The command of standing still without a motion, or after its end with the outcome."""

@@ -72,7 +72,7 @@ def test_paths_begin_at_the_start_and_end_at_the_goal(name):
 
 @each_maker
 def test_moving_the_world_moves_the_path(name):
-    ball = in_the_way(path_of("screw-no-repet"))
+    ball = in_the_way(path_of("screw-guard-only"))
     there = Obstacle(ball.shape, MOVED @ ball.pose, name="ball")
     one = path_of(name, obstacles=[ball]).moved(MOVED)
     # the trees' planes follow the axes of the world
@@ -90,7 +90,7 @@ def test_only_in_the_goals_frame_a_primitive_turns_with_the_goal(name):
     assert worst(path_of(name).moved(aside), path_of(name, aside @ start_of(), aside @ PLACE)) < 1e-6
 
 
-@pytest.mark.parametrize("name, same", [("screw-no-repet", True), ("decoupled", False), ("replay", False)])
+@pytest.mark.parametrize("name, same", [("screw-guard-only", True), ("decoupled", False), ("replay", False)])
 def test_another_frame_on_the_tool_changes_what_is_no_screw(name, same):
     tool = at([0.1, 0.0, 0.05], [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
     start = at([-0.2, -0.1, 0.1], [0.9, 0.1, 0.3, np.sqrt(1 - 0.91)]) @ PLACE
@@ -119,7 +119,7 @@ def test_decoupled_is_the_screw_where_only_one_of_both_moves(between, same):
     imitated = imitated_path(demonstrated(), PLACE)
     guiding = imitated[guide_index(imitated, settings_of("decoupled").motion.guide)]
     start = guiding @ between
-    gap = worst(path_of("decoupled", start), path_of("screw-no-repet", start))
+    gap = worst(path_of("decoupled", start), path_of("screw-guard-only", start))
     assert (gap < 1e-9) == same
     if not same:
         assert gap > 0.01
@@ -157,8 +157,8 @@ def test_without_obstacles_nearby_the_potential_path_is_tsia_bit_by_bit():
 
 
 def test_the_field_leads_round_a_ball_and_back_to_the_reference():
-    ball = in_the_way(path_of("screw-no-repet"))
-    free, led = path_of("screw-no-repet"), path_of("potential", obstacles=[ball])
+    ball = in_the_way(path_of("screw-guard-only"))
+    free, led = path_of("screw-guard-only"), path_of("potential", obstacles=[ball])
     assert min(clear_of(pose, TOOL, [ball]) for pose in free) < 0.0
     assert min(clear_of(pose, TOOL, [ball]) for pose in led) > 0.0
     assert led[-1].distance_to(PLACE)[0] < 1e-9
@@ -255,10 +255,16 @@ def test_a_guard_is_off_unless_it_is_asked_for(name):
 
 
 @pytest.mark.parametrize(
-    "name, setting", [("screw-no-repet", "avoid"), ("screw-no-guard", "guard"), ("screw-ee-only", "whole_arm")]
+    "name, setting",
+    [
+        ("screw-trees-only", "search"),
+        ("screw-search-only", "trees"),
+        ("screw-no-guard", "guard"),
+        ("screw-ee-only", "whole_arm"),
+    ],
 )
 def test_an_ablation_is_the_method_with_one_setting(name, setting):
-    kept = {"motion", "safety", "resample", "trim", "repet", "avoid", "guard", "whole_arm"} - {setting}
+    kept = {"motion", "safety", "resample", "trim", "repet", "trees", "search", "guard", "whole_arm"} - {setting}
     one, other = settings_of(name), settings_of("screw")
     assert not getattr(one, setting) and getattr(other, setting)
     assert all(getattr(one, key) == getattr(other, key) for key in kept)

@@ -20,7 +20,7 @@ SEARCH = PlanSettings(search=JointSearchSettings(seeds=2, rounds=1, targets=1))
 FAR = re.compile(r"ik_or_limit: the goal is ([\d.]+) m from the first joint, (\w+); the arm reaches at most ([\d.]+) m")
 
 
-@pytest.mark.parametrize("settings", [SEARCH, PlanSettings(search=None), PlanSettings(avoid=False)])
+@pytest.mark.parametrize("settings", [SEARCH, PlanSettings(search=None), PlanSettings(trees=False, search=None)])
 @pytest.mark.parametrize("excess", [1e-7, 0.01, 4.0])
 def test_a_goal_out_of_reach_is_said_by_every_planner_with_numbers_that_differ(settings, excess):
     goal = at(BASE + np.array([0.0, 0.0, max_reach(ARM) + excess]), HERE.quaternion)

@@ -79,6 +79,6 @@ def test_no_plan_follows_a_demonstration_through_what_it_may_touch(seed):
     found = certify(plan.log())
     assert found.ok and found.contact_excess <= CONTACT_ROOM, found.reasons
     assert SETTINGS.search is not None
-    alone = planner_of(replace(SETTINGS, search=None, avoid=False))
+    alone = planner_of(replace(SETTINGS, search=None, trees=False))
     failed = alone.plan(demonstrated(), start, ARM.fk(goal), [ball], allowed=everywhere(ball), seed=seed)
     assert failed.why == "an allowed contact is deeper on the way"

@@ -183,7 +183,13 @@ def test_search_settings_out_of_range_are_refused_in_one_line(values):
 
 
 def test_without_search_and_detours_there_is_the_safety_layer_alone():
-    ways = {"all": SETTINGS, "no search": replace(SETTINGS, search=None), "none": replace(SETTINGS, avoid=False)}
+    ways = {
+        "all": SETTINGS,
+        "no search": replace(SETTINGS, search=None),
+        "no trees": replace(SETTINGS, trees=False),
+        "none": replace(SETTINGS, trees=False, search=None),
+    }
+    allowed = {"all": WAYS[:3], "no search": WAYS[:2], "no trees": (WAYS[0], WAYS[2]), "none": WAYS[:1]}
     solved = dict.fromkeys(ways, 0)
     for name, settings in ways.items():
         for seed in range(8):
@@ -192,5 +198,6 @@ def test_without_search_and_detours_there_is_the_safety_layer_alone():
             solved[name] += found.success
             if found.success:
                 assert judged(scene, found).ok
-                assert found.how in WAYS[: {"all": 3, "no search": 2, "none": 1}[name]]
+                assert found.how in allowed[name]
+    assert solved["none"] < solved["no trees"] == 8
     assert solved["none"] < solved["all"] and solved["no search"] < solved["all"] == 8
