@@ -53,6 +53,7 @@ class SingleMotionEnv(TaskEnv[ProgressT]):
         seen: Any = self.observation_space
         # the servos respond some actions late: without the last action a learner sees only half of the state
         self.observation_space: Any = gym.spaces.Dict({**seen.spaces, LAST_ACTION: self.action_space})
+        self.boxes = self.observation_space.spaces
         self._check_way(level_named(self.level).obstacles if self.obstacles is None else self.obstacles)
         dense = self.reward_kind == "dense" or goal_form
         self.ends_on_success = not dense if end_on_success is None else end_on_success

@@ -16,7 +16,7 @@ from ..core.progress import Progress
 from ..scene.scene import ARM, BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OTHER_ARM, OTHER_FINGERS
 from ..scene.scene_objects import TABLE_HEIGHT
 from ..simulation.state import State
-from .geometry import SOURCE, TARGET
+from .facts import SOURCE, TARGET
 
 ENOUGH, SPILLED = 0.9, 0.05
 """Least share of the beads in the target, and largest share outside both glasses, for success."""

@@ -14,6 +14,7 @@ from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
 from ..core.spaces import REACH
 from ..simulation.simulation import Start
 from ..simulation.state import State
+from .facts import INSERT_ONE
 from .parts import BOOK_SIZE
 from .rules import MAX_ANGLE, MAX_OFFSET, WITHDRAWN, ShelveProgress
 from .shelve_env import GRASP, INSERTION_DEPTH, ShelveEnv
@@ -38,83 +39,9 @@ class InsertProgress(ShelveProgress):
 
 
 class InsertOneEnv(SingleMotionEnv[ShelveProgress], ShelveEnv):
-    """Insert the book in the hand into its slot.
+    """Insert the book in the hand into its slot."""
 
-    ## Description
-    A book (160 x 220 x 35 mm, 0.3 kg) is in the hand, upright, spine to the hand, 22 cm in front of its slot in a
-    cluttered cupboard, held only by friction between the fingers. It must be inserted and released, and the hand
-    withdrawn by 15 cm. Success is judged from the simulator as in `onedemo/Shelve-v0`: for half a second the book is
-    within 10 mm and 5 degrees of its slot, touched by no finger and at rest, and no clutter book was moved by more than
-    5 cm or turned by more than 15 degrees.
-
-    ## Action Space
-    `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (6, 7) | the book, then the clutter; a book's x points away from its spine, z along it |
-    | `goal_pose` | (1, 7) | goal of the book; constant during an episode |
-    | `furniture_pose` | (3, 7) | cupboard, stand and the stand's foot; constant during an episode |
-    | `motion_index` | (1,) | 1 while the book is held, 0 while it is not, 2 when it is shelved |
-    | `obstacle_active` | (3,) | 0: there is no obstacle |
-    | `obstacle_shape` | (3,) | 0 |
-    | `obstacle_size` | (3, 3) | 0 |
-    | `obstacle_pose` | (3, 7) | 0 |
-    | `obstacle_velocity` | (3, 3) | 0 |
-    | `last_action` | that of the action | last action; zeros at the start |
-
-    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
-    vector), `achieved_goal` and `desired_goal`
-    (8,): pose of the book, and 1 once it is released and the hand is 15 cm away, else 0; its slot and 1.
-    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
-
-    ## Rewards
-    `reward="dense"` (default): in [0, 1]: up to 0.75 for bringing the held book into its slot, from 0.75 to 1 for
-    withdrawing once it stands there. `reward="sparse"`: 1 with success, else 0.
-
-    ## Starting State
-    By `level`: cupboard and clutter as in `onedemo/Shelve-v0`; the book moved by up to 1 cm and 3 degrees (L1) or 2 cm
-    and 6 degrees (L2) about the vertical. L0 is the nominal place; R, S and T start as L1 does. The motion is too
-    short for obstacles: L3, L4 and F do not exist.
-
-    ## Episode End
-    `terminated` when a book has fallen off the table.
-    `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
-    `control_frequency`). A settled success ends the episode with
-    `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts`, `min_obstacle_distance` [m], `layouts_refused`, `books_placed`, `position_error` (1,) [m],
-    `angle_error` (1,) [rad], `clutter_pushed_over`.
-
-    ## Arguments
-    `robot="Panda"` (Baxter and every robot of `onedemo/Shelve-v0`), `shelf="upper" | "lower"`, `level="L1"`,
-    `obstacles=None` or `"none"`, `control_mode="ee_twist" | "joint_velocity"`, `reward="dense" | "sparse"`,
-    `control_frequency=20` (10, 20, 25 or 50: any that divides 500), `goal_form=False`, `end_on_success=None`,
-    `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `cupboard_pose` (7,), `slots` (shift
-    along the shelf [m]), `clutter` (5, 2: gaps [m] from neighbor or wall, and from the front) and `joint_positions`
-    (7,), which the book follows.
-
-    ## Version History
-    * v0: first version.
-    """
-
+    FACTS = INSERT_ONE
     GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(

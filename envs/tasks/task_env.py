@@ -26,6 +26,7 @@ from ..simulation.render import Ghost
 from ..simulation.simulation import Start
 from ..simulation.state import State
 from .arrangement import Arrangement
+from .facts import own_facts
 from .judge import GOAL, angle_between, offsets
 from .layout import JOINTS, TaskLayout, TaskLayouts
 from .places import Range
@@ -37,73 +38,7 @@ OPTIONS = ("level", "obstacles", "object_poses", "joint_positions")
 
 
 class DeclaredEnv(SingleMotionEnv[TaskProgress]):
-    """A user's own task, declared as data.
-
-    ## Description
-    See the task's own summary. Success is judged from the simulator: for `Success.seconds` every object with a goal is
-    within its tolerance, touched by no finger and at rest, the hand has withdrawn, and the task's own condition holds.
-
-    ## Action Space
-    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or things. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n, 7) | poses of the objects |
-    | `goal_pose` | (g, 7) | goals, in the order of the task; constant during an episode |
-    | `motion_index` | (1,) | 2k while k objects are in place, 2k + 1 while the fingers touch an object |
-    | `furniture_pose` | (m, 7) | poses of the fixtures; only where there are any |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-    | `last_action` | that of the action | last action; zeros at the start |
-
-    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
-    vector), `achieved_goal` and `desired_goal` (8 g,): pose of each object with a goal, and 1 where it is released,
-    else 0; its goal and 1. A task without goals has no goal form.
-
-    ## Rewards
-    `reward="sparse"` (default): 1 with success, else 0. `reward="dense"`: in [0, 1], mean over the goals: up to 0.75
-    for bringing the object there, from 0.75 to 1 for withdrawing; without goals it is that of success.
-
-    ## Starting State
-    By `level`: L0 the nominal layout; L1 and L2 things and goals moved as the task's ranges say. L3, L4 and F are L2
-    with obstacles on the way of the objects, see `onedemo/Stack-v0`. R, S and T start as L1 does.
-
-    ## Episode End
-    `terminated` with a settled success (with sparse rewards, or `end_on_success=True`), when an object has fallen off
-    the table, or when one of the task's conditions of failure holds. `truncated` after the task's time limit.
-
-    ## Info
-    `is_success`, `success`, `safe` (so far an obstacle was touched by neither robot nor object, and nothing else by a
-    link of the arm), `stage`, `failure_reason`, `collision`, `n_contacts`, `min_obstacle_distance` [m],
-    `layouts_refused`, `placed`, `position_error` (g,) [m], `angle_error` (g,) [rad], and the task's own numbers.
-
-    ## Arguments
-    `robot="Panda"` (any, with one arm at work), `level="L1"`, `obstacles=None` (those of the level) or `"none" |
-    "static" | "appear" | "moving" | "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `goal_form=False`, `end_on_success=None`,
-    `render_mode=None | "rgb_array" | "human"`, `arm=None`. `reset(options=...)` takes `level`, `obstacles`,
-    `object_poses` (n, 7) and `joint_positions` (7,).
-
-    ## Version History
-    * v0: first version.
-    """
+    """A user's own task, declared as data."""
 
     def __init__(
         self,
@@ -121,7 +56,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
     ):
         if not isinstance(declared, Task):
             raise BadTask(declared, "", f"is a {type(declared).__name__}, not a Task")
-        self.declared, kind = declared, robot_named(robot)
+        self.declared, self.FACTS, kind = declared, own_facts(declared), robot_named(robot)
         fixtures = tuple(each.furniture for each in declared.fixtures)
         if goal_form and not declared.goals:
             raise BadOption("goal_form", f"{declared.name} has no goals: success is only a condition")

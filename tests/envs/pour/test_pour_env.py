@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.envs.pour.geometry import BEADS, GLASSES, SOURCE, TARGET, TILTED, grasp, pouring, tcp_from_glass
+from onedemo.envs.pour.facts import SOURCE, TARGET
+from onedemo.envs.pour.geometry import BEADS, GLASSES, TILTED, grasp, pouring, tcp_from_glass
 from onedemo.envs.pour.layout import FARTHEST, GAP, NEAREST, RANGES, pour_layout
 from onedemo.envs.pour.places import POUR_PLACES, PourPlaces
 from onedemo.envs.pour.rules import PourProgress, allowed_contact, beads_inside
