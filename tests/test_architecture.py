@@ -21,7 +21,7 @@ ORDER = {
         control imitation skills recordings log escape safety judge planning reactive
     """,
     "envs": """
-        errors dotted_names facts mujoco_library scene simulation core stack pour shelve guests shipped
+        errors dotted_names facts mujoco_library scene simulation judge core stack pour shelve guests shipped
         registration tasks task_table
     """,
     "configs": """

@@ -16,6 +16,7 @@ from ...planner.errors import BadOption
 from ..errors import BadAction, NoRoom
 from ..facts.page import Page
 from ..facts.task_facts import TaskFacts
+from ..judge.progress import Progress
 from ..scene.robot_description import robot_parts
 from ..scene.robots import Robot
 from ..scene.scene import OBSTACLE, CompiledScene, compiled_scene
@@ -30,7 +31,6 @@ from .description import TaskDescription, TaskFurniture, TaskObject
 from .levels import checked_obstacles, level_named
 from .obstacle_placement import placed
 from .placement_context import ObstacleRequest, PlacementContext, PlacementMotion
-from .progress import Progress
 from .reset_options import checked_choice
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")

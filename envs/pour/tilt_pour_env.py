@@ -8,10 +8,10 @@ import numpy as np
 
 from ...planner import Pose
 from ...planner.errors import BadOption
-from ..core.dense_reward import near, tilting
 from ..core.grasped_start import SQUEEZE, can_follow, holding_joints
 from ..core.reset_options import check_known, checked_joints
 from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
+from ..judge.dense_reward import near, tilting
 from ..scene.beads import poured_into
 from ..simulation.simulation import Start
 from ..simulation.state import State

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...planner import Pose
 from ...planner.errors import BadOption
-from ..core.dense_reward import closeness, placing
 from ..core.grasped_start import SQUEEZE, can_follow, holding_joints
-from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
 from ..core.spaces import REACH
+from ..judge.dense_reward import closeness, gaps
+from ..judge.goal_progress import GoalProgress, one_placed
+from ..judge.judge import MEMORY
 from ..simulation.simulation import Start
 from ..simulation.state import State
 from .facts import INSERT_ONE
 from .parts import BOOK_SIZE
-from .rules import MAX_ANGLE, MAX_OFFSET, WITHDRAWN, ShelveProgress
+from .rules import MAX_ANGLE, MAX_OFFSET, WITHDRAWN
 from .shelve_env import GRASP, INSERTION_DEPTH, ShelveEnv
 
 ASIDE, TURN = {"L0": 0.0, "L1": 0.01, "L2": 0.02}, {"L0": 0.0, "L1": np.deg2rad(3.0), "L2": np.deg2rad(6.0)}
@@ -26,19 +29,11 @@ INSERTION_STEPS = (0.75, 0.5, 0.25, 0.0)
 MAX_STARTS = 200
 
 
-class InsertProgress(ShelveProgress):
-    """Progress of inserting one book that is in the hand from the start."""
-
-    def reward(self, state: State) -> float:
-        """See `Progress`."""
-        pose, goal, tcp = state.object_pose[0], self._goals[0], state.tcp_pose[0]
-        distance, angle = gaps(pose, goal, half_turns=False)
-        reach = float(np.linalg.norm(pose[:3] - tcp[:3]))
-        away = min(1.0, reach / WITHDRAWN)
-        return float(placing(reach, float(distance), float(angle), self.held, self.placed == 1, away))
+BY_HAND = partial(one_placed, k=0, half_turns=False)
+"""Dense reward of the book."""
 
 
-class InsertOneEnv(SingleMotionEnv[ShelveProgress], ShelveEnv):
+class InsertOneEnv(SingleMotionEnv[GoalProgress], ShelveEnv):
     """Insert the book in the hand into its slot."""
 
     FACTS = INSERT_ONE
@@ -79,7 +74,10 @@ class InsertOneEnv(SingleMotionEnv[ShelveProgress], ShelveEnv):
                 continue
             poses = start.objects.copy()
             poses[0] = (self.arms[0].fk(joints[0]) @ GRASP.inverse()).vector
-            self._progress = InsertProgress(self._goal_pose, poses, self.control_dt, in_hand=True)
+            self._progress = GoalProgress(
+                self._rules, self._goal_pose, poses, self.control_dt, in_hand=0, dense=BY_HAND
+            )
+            self._progress.memory[MEMORY.height, 0] = -np.inf
             return Start(joints, poses, start.furniture, grips=np.array([BOOK_SIZE[1] - SQUEEZE]))
         raise BadOption("cupboard_pose", "the hand cannot be before the slot, or not go straight in from there")
 

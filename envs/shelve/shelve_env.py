@@ -13,6 +13,7 @@ from ..core.environment import MAX_LAYOUTS, Observation, TaskEnv
 from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_choice, checked_joints
 from ..core.spaces import pose_box
+from ..judge.goal_progress import GoalProgress
 from ..scene.body_clearance import arm_clearance
 from ..scene.robots import places_of, robot_named
 from ..scene.scene_objects import SceneSpec
@@ -24,7 +25,7 @@ from .layout import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
 from .options import OPTIONS, given_layout
 from .parts import BOOK_SIZE, SHELVES, books, cupboard, stand
 from .places import SHELF_PLACES
-from .rules import ShelveProgress
+from .rules import hand_over, shelve_rules
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
 LIFT, INSERTION_DEPTH = 0.15, 0.22
@@ -42,7 +43,7 @@ PAPER_SIZES = (0.06, 0.09)
 """Sizes of the obstacles that appear while the second and the third book are placed [m]."""
 
 
-class ShelveEnv(TaskEnv[ShelveProgress]):
+class ShelveEnv(TaskEnv[GoalProgress]):
     """Shelve three books in the upper shelf of a cluttered cupboard, with one arm."""
 
     FACTS = SHELVE
@@ -81,14 +82,15 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
             view=VIEW,
             more={"furniture_pose": pose_box(len(furniture))},
         )
-        self._ready = np.array([self._places.ready])
+        self._ready, self._rules = np.array([self._places.ready]), shelve_rules(n_books)
         self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], self._places, n_books, self._ready.shape)
         self._take_layout(self._drawn)
 
     def _take_layout(self, drawn: ShelfLayout) -> None:
         self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
         self._furniture = drawn.furniture()
-        self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
+        self._handed = 1
+        self._progress = GoalProgress(self._rules, self._goal_pose, drawn.objects(), self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
@@ -112,7 +114,7 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Apply an action for one control step; afterwards hand over the next book if it is due."""
         reached = super().step(action)
-        k = self._progress.handed
+        k = self._handed
         if (
             k < self.n_books
             and self._progress.placed == k
@@ -120,7 +122,8 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
         ):
             pose = self._drawn.handed(k).vector
             self.sim.put(k, pose)
-            self._progress.hand_over(pose)
+            hand_over(self._progress, k, pose)
+            self._handed += 1
         return reached
 
     def _is_clear(self, place: Pose, joints: np.ndarray, clearance: float) -> bool:

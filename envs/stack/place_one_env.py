@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...planner.errors import BadOption
-from ..core.dense_reward import closeness, placing
 from ..core.grasped_start import SQUEEZE, holding_joints
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import checked_choice, checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
 from ..core.spaces import REACH
+from ..judge.dense_reward import closeness, gaps
+from ..judge.goal_progress import GoalProgress, one_placed
 from ..simulation.simulation import Start
 from ..simulation.state import State
 from .facts import PLACE_ONE
 from .grasps import block_grasps
-from .rules import BLOCK, MAX_HEIGHT, MAX_OFFSET, MAX_YAW, WITHDRAWN, StackProgress
+from .rules import BLOCK, MAX_HEIGHT, MAX_OFFSET, MAX_YAW, WITHDRAWN
 from .stack_env import StackEnv
 
 ONTO = ("table", "block")
@@ -28,19 +30,11 @@ UP = 0.008
 MAX_STARTS = 200
 
 
-class PlaceProgress(StackProgress):
-    """Progress of placing the last block, which may be in the hand from the start."""
-
-    def reward(self, state: State) -> float:
-        """See `Progress`."""
-        pose, goal, tcp = state.object_pose[-1], self._goals[-1], state.tcp_pose[0]
-        distance, angle = gaps(pose, goal, half_turns=True)
-        reach = float(np.linalg.norm(pose[:3] - tcp[:3]))
-        away = min(1.0, reach / WITHDRAWN)
-        return float(placing(reach, float(distance), float(angle), self.held, self.placed == self.n_blocks, away))
+BY_HAND = partial(one_placed, k=-1, half_turns=True)
+"""Dense reward of the last block."""
 
 
-class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
+class PlaceOneEnv(SingleMotionEnv[GoalProgress], StackEnv):
     """Put the block in the hand at its goal, on the table or on another block."""
 
     FACTS = PLACE_ONE
@@ -75,7 +69,6 @@ class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
             render_mode=render_mode,
             arm=arm,
         )
-        self._progress = PlaceProgress(self._goal_pose, self._goal_pose, self.control_dt)
         self._take_form("place_one", goal_form, end_on_success)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
@@ -90,7 +83,8 @@ class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
                 if found is None:
                     continue
                 joints = found
-            self._progress = PlaceProgress(self._goal_pose, start.objects, self.control_dt, in_hand=self.pregrasped)
+            held, dt = self.n_blocks - 1 if self.pregrasped else None, self.control_dt
+            self._progress = GoalProgress(self._rules, self._goal_pose, start.objects, dt, in_hand=held, dense=BY_HAND)
             return Start(joints, poses, grips=grips)
         raise BadOption("object_poses", "the hand cannot hold the block there")
 

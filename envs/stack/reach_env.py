@@ -9,10 +9,10 @@ import numpy as np
 from ...planner import Box, Pose, Sphere
 from ...planner.robot.kinematics import CHAIN
 from ..core import spaces as space
-from ..core.dense_reward import closeness
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
+from ..judge.dense_reward import closeness, gaps
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
 from ..simulation.render import Ghost

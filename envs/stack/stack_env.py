@@ -12,6 +12,7 @@ from ...planner.robot.kinematics import CHAIN
 from ..core.environment import TaskEnv
 from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
+from ..judge.goal_progress import GoalProgress
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
 from ..simulation.render import Ghost
@@ -19,7 +20,7 @@ from ..simulation.simulation import Start
 from .facts import STACK
 from .grasps import above, block_grasps, block_poses, check_places
 from .layout import BASE_GAP, LONG_GAP, RANGES, stack_layout
-from .rules import BLOCK, BLOCK_SIZE, StackProgress
+from .rules import BLOCK, BLOCK_SIZE, stack_rules
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
 OPTIONS = ("level", "obstacles", "object_poses", "base_pose", "joint_positions")
@@ -31,7 +32,7 @@ PAPER_SPEED = 0.1
 """Peak speed of the obstacle that swings in front of the last block [m/s]."""
 
 
-class StackEnv(TaskEnv[StackProgress]):
+class StackEnv(TaskEnv[GoalProgress]):
     """Stack wooden blocks at a given place, in order, with one arm."""
 
     FACTS = STACK
@@ -69,7 +70,8 @@ class StackEnv(TaskEnv[StackProgress]):
         )
         self.n_blocks, self._reach = n_blocks, kind.reach
         self._goal_pose = np.zeros((n_blocks, 7))
-        self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
+        self._rules = stack_rules(n_blocks)
+        self._progress = GoalProgress(self._rules, self._goal_pose, self._goal_pose, self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
@@ -88,7 +90,7 @@ class StackEnv(TaskEnv[StackProgress]):
             joints = checked_joints(options["joint_positions"], self.arms)
         self._goal_pose = np.repeat(base[None], self.n_blocks, axis=0)
         self._goal_pose[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
-        self._progress = StackProgress(self._goal_pose, poses, self.control_dt)
+        self._progress = GoalProgress(self._rules, self._goal_pose, poses, self.control_dt)
         return Start(joints, poses)
 
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:

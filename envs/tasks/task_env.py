@@ -12,13 +12,14 @@ from ...planner.errors import BadOption
 from ...planner.robot.kinematics import CHAIN
 from ..core import spaces as space
 from ..core.carries import carry_motion, corners_at, grasp_from_above, reach_motion
-from ..core.dense_reward import closeness
 from ..core.description import TaskDescription
 from ..core.environment import Observation
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
 from ..core.single_motion import Agreement, SingleMotionEnv
 from ..errors import BadTask
+from ..judge.dense_reward import closeness
+from ..judge.judge import GOAL, MEASURE, is_met, measure
 from ..scene.robots import robot_named
 from ..scene.scene import FINGERS, FIRST_OBJECT
 from ..scene.scene_objects import SceneSpec
@@ -27,10 +28,9 @@ from ..simulation.simulation import Start
 from ..simulation.state import State
 from .arrangement import Arrangement
 from .facts import own_facts
-from .judge import GOAL, angle_between, offsets
 from .layout import JOINTS, TaskLayout, TaskLayouts
 from .places import Range
-from .rules import TaskProgress, goal_rows
+from .rules import TaskProgress, task_rules
 from .success import SceneView
 from .task import FREQUENCY, Task
 
@@ -77,7 +77,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
         )
         axis = self.arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
         self._arrangement = Arrangement(TaskLayouts(declared, robot, axis, kind.reach), self.sim)
-        self._rows = goal_rows(declared)
+        self._rules = task_rules(declared)
         self.GOAL_BOUNDS = (*(space.REACH,) * 3, *(1.0,) * 5) * len(declared.goals)
         self._take_form(declared.name, goal_form, end_on_success)
         layout = self._arrangement.nominal
@@ -93,7 +93,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
         fixtures = {name: Pose.from_vector(row) for name, row in zip(fixed, layout.fixtures, strict=True)}
         goals = {name: Pose.from_vector(row) for name, row in zip(self.declared.goals, layout.goals, strict=True)}
         view = SceneView(names, fixtures, goals)
-        return TaskProgress(self.declared, view, self._rows, layout.goals, layout.objects, self.control_dt)
+        return TaskProgress(self.declared, view, self._rules, layout.goals, layout.objects, self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
@@ -126,7 +126,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
 
     def _thing(self, goal: int) -> int:
         """Return the index of a goal's object."""
-        return int(self._rows[goal, GOAL.thing])
+        return int(self._rules.rows[goal, GOAL.thing])
 
     def _ghosts(self) -> list[Ghost]:
         """Return the goals that are ranges on the table; at another thing, that thing is seen."""
@@ -163,12 +163,12 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
     def _agreement(self, are: np.ndarray, wanted: np.ndarray) -> tuple[float, float]:
         """Return closeness and whether all goals (g, 8) are reached."""
         near, reached = [], True
-        for row, one, goal in zip(self._rows, are, wanted, strict=True):
-            across, along = offsets(one, goal)
-            angle = angle_between(one, goal, row[GOAL.yaw_symmetry])
-            there = across <= row[GOAL.xy] and along <= row[GOAL.z] and angle <= row[GOAL.angle]
-            reached = reached and there and one[7] >= goal[7]
-            near.append(closeness(float(np.hypot(across, along)), angle))
+        for row, one, goal in zip(self._rules.rows, are, wanted, strict=True):
+            errors = np.zeros(MEASURE.width)
+            measure(one[:7], goal[:7], row[GOAL.yaw_symmetry], errors)
+            reached = reached and is_met(errors, row) and one[7] >= goal[7]
+            far = float(np.hypot(errors[MEASURE.across], errors[MEASURE.along]))
+            near.append(closeness(far, errors[MEASURE.angle]))
         return float(np.mean(near)), float(reached)
 
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
