@@ -256,14 +256,13 @@ def record(
     """
     import gymnasium as gym
 
-    from .. import envs  # noqa: F401  (registers the ids)
     from ..baselines.recording.recorders import recorder_of
+    from ..envs import facts_of
     from ..planner import save_demonstration
-    from .task_table import environment_id
 
     check_writable("--output", output)
     recorder = recorder_of(task)
-    env = gym.make(environment_id(task), level="L0", **recorder.scene)
+    env = gym.make(facts_of(task, load=True).id, level="L0", **recorder.scene)
     with console(stderr=True).status("moving the arm"):
         demo = recorder.record(env.unwrapped)
     env.close()

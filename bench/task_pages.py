@@ -1,15 +1,13 @@
-"""`onedemo tasks`: list the environments, or write a documentation page of each from its docstring."""
+"""`onedemo tasks`: list the environments, or write a documentation page of each."""
 
 from __future__ import annotations
 
-import inspect
 from pathlib import Path
 from typing import Any
 
 from ..configs import BadConfig
-from ..envs import IDS
+from ..envs import TASKS
 from .console import console, writing
-from .task_table import TASKS
 
 CLIP_SIZE = (480, 360)
 CLIP_SECONDS = 8.0
@@ -28,30 +26,19 @@ def list_tasks() -> None:
     for head in ("id", "what it is", "seconds", "config"):
         table.add_column(head, no_wrap=head == "id")
     for name, facts in TASKS.items():
-        table.add_row(facts.id, summary_of(facts.id), f"{IDS[facts.id].seconds:g}", f"onedemo run {name}")
+        table.add_row(facts.id, facts.page.summary, f"{facts.seconds:g}", f"onedemo run {name}")
     console().print(table, soft_wrap=False)
-
-
-def environment_class(identifier: str) -> type:
-    """Return the class behind a Gymnasium id; loads the simulator."""
-    from gymnasium.envs.registration import load_env_creator
-
-    made: Any = load_env_creator(str(_spec(identifier).entry_point))
-    return made
-
-
-def summary_of(identifier: str) -> str:
-    """Return the first paragraph of an environment's docstring in one line."""
-    return " ".join(str(inspect.getdoc(environment_class(identifier))).split("\n\n")[0].split())
 
 
 def page_text(task: str) -> str:
     """Return the Markdown page of a task's environment: its docstring below its clip, if it has one."""
+    import gymnasium as gym
+
     identifier = TASKS[task].id
-    summary, _, rest = str(inspect.getdoc(environment_class(identifier))).partition("\n\n")
+    summary, _, rest = str(gym.make(identifier).unwrapped.__doc__).partition("\n\n")
     return "\n\n".join([
         f"# {identifier}",
-        " ".join(summary.split()),
+        summary,
         f"![The planner at work on {identifier}]({task}.webp)",
         f'```python\nimport gymnasium as gym\nimport onedemo.envs\n\nenv = gym.make("{identifier}")\n```',
         rest,
@@ -71,7 +58,9 @@ def own_page(path: str) -> str:
     from ..envs.tasks.describe import described
 
     try:
-        return f"{described(task_at(path))}\n\nOne run of the planner on it: `onedemo run {path}`."
+        own = task_at(path)
+        page = f"# {own.id}\n\n{own.summary}\n\n{described(own)}"
+        return f"{page}\n\nOne run of the planner on it: `onedemo run {path}`."
     except BadDottedName as error:
         raise BadConfig(path, "", error.reason) from None
 
@@ -148,7 +137,7 @@ def write_clip(task: str, file: Path) -> Path:
     env = made(config, "rgb_array")
     policy = policy_for(env, config)
     pictures: list[Any] = []
-    every = max(1, IDS[TASKS[task].id].steps // MOST_PICTURES)
+    every = max(1, TASKS[task].steps // MOST_PICTURES)
     with writing("--write", file):
         run_episode(
             env, policy, scenarios_of(config)[0], config, lambda env, _: pictures.append(_picture(env, pictures, every))
@@ -171,11 +160,3 @@ def _save(file: Path, pictures: list[Any]) -> None:
     kept = drawn[::step]
     pause = round(1000.0 * CLIP_SECONDS / len(kept))
     kept[0].save(file, save_all=True, append_images=kept[1:], duration=pause, loop=0, quality=CLIP_QUALITY, method=6)
-
-
-def _spec(identifier: str) -> Any:
-    import gymnasium as gym
-
-    from .. import envs  # noqa: F401  (registers the ids)
-
-    return gym.spec(identifier)

@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..planner.lazy_names import lazy_names
-from .registration import IDS, register_all
+from .registration import register_all
+from .shipped import IDS, TASKS
 
 if TYPE_CHECKING:
     from .core.description import FAILURES as FAILURES
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from .core.levels import LEVELS as LEVELS
     from .scene.robots import ROBOTS as ROBOTS
     from .simulation.moving_obstacles import ScheduledObstacle as ScheduledObstacle
+    from .task_table import facts_of as facts_of
     from .tasks.model_files import parts_of_mesh as parts_of_mesh
     from .tasks.model_files import parts_of_mjcf as parts_of_mjcf
     from .tasks.places import At as At
@@ -37,6 +39,7 @@ __all__ = [
     "IDS",
     "LEVELS",
     "ROBOTS",
+    "TASKS",
     "At",
     "Fixture",
     "Movable",
@@ -50,6 +53,7 @@ __all__ = [
     "TaskEnv",
     "TaskObject",
     "Tolerance",
+    "facts_of",
     "parts_of_mesh",
     "parts_of_mjcf",
     "register_all",
@@ -70,6 +74,7 @@ if not TYPE_CHECKING:  # a type checker would take any name for known
             ".core.levels": ("LEVELS",),
             ".scene.robots": ("ROBOTS",),
             ".simulation.moving_obstacles": ("ScheduledObstacle",),
+            ".task_table": ("facts_of",),
             ".tasks.model_files": (
                 "parts_of_mesh",
                 "parts_of_mjcf",

@@ -20,7 +20,10 @@ ORDER = {
         errors lazy_names deferred_imports ranges arrays jit columns strict_json resumable geometry models robot
         collision fitting control imitation skills recordings log escape search safety judge planning reactive
     """,
-    "envs": "errors registration dotted_names mujoco_library scene simulation core stack pour shelve guests tasks",
+    "envs": """
+        errors dotted_names facts mujoco_library scene simulation judge core stack pour shelve guests shipped
+        registration tasks task_table
+    """,
     "configs": """
         errors shipped_files dotted_keys strict_yaml dataclass_settings skill_file demonstrations run_config
         learner_arguments grid train_config plan_scene_schema plan_scene
@@ -30,7 +33,7 @@ ORDER = {
         safe_actions screw_policy learning factory paths_only
     """,
     "bench": """
-        console usage atomic_files statistics provenance interruption task_table method_table drawing
+        console usage atomic_files statistics provenance interruption method_table drawing
         recordings demonstrations document robot metrics plan workers episodes report geometric run task_pages
         reproduce train curves perf mbm survey cli
     """,

@@ -26,6 +26,24 @@ GRIPS = {"close": 1.0, "open": -1.0}
 """Gripper entry of an action."""
 LEVEL = "L0"
 """Level of the starts at which the demonstration is played."""
+
+
+class Leg(NamedTuple):
+    """Part of an episode.
+
+    Attributes:
+        path: path of the tcp.
+        grip: gripper entry of the actions on it.
+        ending: gripper entry of the actions that change the grip at its end; None: it stays as it is.
+    """
+
+    path: PosePath
+    grip: float
+    ending: float | None
+
+
+LegAt = Callable[[Observation], Leg]
+"""Function from the observation where a part of the episode begins to this part."""
 Goal = Callable[[Observation], Pose]
 """Function from the first observation to the tcp's pose at the end of the path."""
 
@@ -110,25 +128,43 @@ def demo_episode(
         UnknownName: no such segment.
         BadOption: the environment has two arms, or another kind of observation.
     """
-    task: TaskDescription = env.unwrapped.task
-    if len(task.arms) != 1:
-        raise BadOption("env", f"has {len(task.arms)} arms; a demonstration is played with one")
-    if "tcp_pose" not in getattr(env.observation_space, "spaces", {}):
-        raise BadOption("env", "has no tcp_pose in its observation: neither flat features nor the goal form will do")
     names, playback = [segments] if isinstance(segments, str) else list(segments), playback or Playback()
     path = demonstration.segment_path(names[0])
     for name in names[1:]:
         path = path.joined(demonstration.segment_path(name))
     last = demonstration.segment(names[-1])
+    ending = GRIPS.get(playback.ending or last.gripper)
+
+    def only(observation: Observation) -> Leg:
+        moved = path if goal is None else imitated_path(path, goal(observation))
+        joined = moved[guide_index(moved, playback.begin) :] if playback.begin > 0.0 else moved
+        return Leg(joined, GRIPS["close" if last.held else "open"], ending)
+
+    return episode_of(env, iter([only]), playback, seed=seed)
+
+
+def episode_of(env: Any, legs: Iterator[LegAt], playback: Playback, *, seed: int = 0) -> Transitions:
+    """Play an episode of several parts from the environment's nominal start, level L0.
+
+    Args:
+        env: see `demo_episode`.
+        legs: its parts, each a function of the observation where it begins.
+        playback: parameters of the playback.
+        seed: seed of the start.
+
+    Raises:
+        BadOption: see `demo_episode`.
+    """
+    task: TaskDescription = env.unwrapped.task
+    if len(task.arms) != 1:
+        raise BadOption("env", f"has {len(task.arms)} arms; a demonstration is played with one")
+    if "tcp_pose" not in getattr(env.observation_space, "spaces", {}):
+        raise BadOption("env", "has no tcp_pose in its observation: neither flat features nor the goal form will do")
     observation, info = env.reset(seed=seed, options={"level": LEVEL})
-    if goal is not None:
-        path = imitated_path(path, goal(observation))
-    if playback.begin > 0.0:
-        path = path[guide_index(path, playback.begin) :]
     script = _Script(task, playback)
     script.seen = observation
     seen, actions, rewards, ended = [observation], [], [], []
-    for action in script.actions(path, "close" if last.held else "open", playback.ending or last.gripper):
+    for action in script.actions(legs):
         observation, reward, terminated, truncated, info = env.step(action)
         script.seen = observation
         seen.append(observation)
@@ -207,13 +243,15 @@ class _Script:
         self._controller = Controller(task.arms[0], ControllerSettings(gain=playback.gain))
         self.seen: Observation = {}
 
-    def actions(self, path: PosePath, carried: str, ending: str) -> Iterator[np.ndarray]:
-        playback, grip = self._playback, GRIPS[carried]
-        yield from self._along(path, grip)
-        yield from self._still(playback.hold, grip)
-        if ending != "none":
-            grip = GRIPS[ending]
-            yield from self._still(playback.grip, grip)
+    def actions(self, legs: Iterator[LegAt]) -> Iterator[np.ndarray]:
+        playback, grip = self._playback, GRIPS["open"]
+        for leg_at in legs:
+            path, grip, ending = leg_at(self.seen)
+            yield from self._along(path, grip)
+            yield from self._still(playback.hold, grip)
+            if ending is not None:
+                grip = ending
+                yield from self._still(playback.grip, grip)
         if playback.withdraw > 0.0:
             back = self._tcp @ Pose.from_position_quaternion([0.0, 0.0, -playback.withdraw])
             yield from self._along(PosePath(back.dq[None]), grip)

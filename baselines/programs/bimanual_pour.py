@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...envs import TaskDescription
-from ...envs.pour.geometry import SOURCE, TARGET
+from ...envs.pour.facts import SOURCE, TARGET
 from ...planner import Demonstration, Pose, PosePath
 from ...planner.errors import PlanFailed
 from ...planner.geometry import dualquat as dq

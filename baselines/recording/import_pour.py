@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...envs.pour.geometry import GLASSES, SOURCE, TARGET, tcp_from_glass
+from ...envs.pour.facts import SOURCE, TARGET
+from ...envs.pour.geometry import GLASSES, tcp_from_glass
 from ...envs.scene.scene_objects import extents
 from ...planner import Demonstration, Pose, PosePath, Segment
 from ...planner.errors import BadDemonstration, told_apart

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...envs.pour.geometry import BACK, GLASSES, SOURCE, TARGET, TILTED, UP, grasp, pouring
+from ...envs.pour.facts import SOURCE, TARGET
+from ...envs.pour.geometry import BACK, GLASSES, TILTED, UP, grasp, pouring
 from ...planner import Demonstration, Pose
 from .scripted_recorder import ScriptedMotion, Waypoint, recorded
 

@@ -22,10 +22,6 @@ SLOW = 0.12
 """Speed into and out of the shelf [m/s]."""
 
 
-SCENE = {"n_books": 1, "shelf": "lower"}
-"""Arguments of the environment in which the demonstration is recorded."""
-
-
 def shelve_script(observation: dict[str, np.ndarray], width: float) -> Iterator[ScriptedMotion]:
     """Yield the motions for an observed scene.
 
@@ -55,7 +51,7 @@ def _along(height: float) -> Pose:
 
 
 def record_shelve(env: Any) -> Demonstration:
-    """Record the demonstration in `onedemo/Shelve-v0` (unwrapped), made with `SCENE`, at level L0.
+    """Record the demonstration in `onedemo/Shelve-v0` (unwrapped), with one book in the lower shelf, at level L0.
 
     Raises:
         PlanFailed: a waypoint cannot be reached.

@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...envs import Task, task_at
+from ...envs import TASKS, Task, task_at
 from ...envs.dotted_names import is_dotted, said
+from ...envs.facts.task_facts import named
 from ...planner import Demonstration
 from ...planner.errors import OneDemoError, UnknownName
-from .record_pour import record_pour
-from .record_shelve import SCENE, record_shelve
 from .scripted_recorder import ScriptedMotion, recorded
 
 
@@ -26,10 +25,6 @@ class Recorder(NamedTuple):
 
     record: Callable[[Any], Demonstration]
     scene: Mapping[str, Any] = {}
-
-
-RECORDERS = {"pour": Recorder(record_pour), "shelve": Recorder(record_shelve, SCENE)}
-"""Recorder of each scripted task that is shipped."""
 
 
 def recorder_of(task: str) -> Recorder:
@@ -49,9 +44,10 @@ def recorder_of(task: str) -> Recorder:
                 "script", "is not given: write a function of the first observation that yields ScriptedMotion"
             )
         return Recorder(lambda env: _recorded(env, own))
-    if task not in RECORDERS:
-        raise UnknownName("scripted demonstration", task, RECORDERS)
-    return RECORDERS[task]
+    scripted = {name: facts for name, facts in TASKS.items() if facts.recorder}
+    if task not in scripted:
+        raise UnknownName("scripted demonstration", task, scripted)
+    return Recorder(named(scripted[task].recorder), scripted[task].recorded_in)
 
 
 def _recorded(env: Any, task: Task) -> Demonstration:

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...configs import RunConfig
-from ...envs import ScheduledObstacle
+from ...envs import TASKS, ScheduledObstacle
 from ...planner import Sphere
 from ..metrics.metric_table import METRICS
-from ..task_table import TASKS
 from .episode_records import FILE, EpisodeRecord, encoded
 from .run_folder import CELLS, VERSION
 from .scenarios import Suite, frozen, place_of

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...configs import load_demonstration
+from ...envs import facts_of
 from ...planner import Demonstration, PosePath
 from ...planner.imitation.segmentation import resampled, trimmed
 from ...planner.judge.deviation import frechet, screw_gaps
-from ..task_table import facts_of
 from .carry_segments import Carry, tilts
 from .trace import Trace
 

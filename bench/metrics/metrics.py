@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from ...envs import facts_of
 from ...planner import Demonstration
-from ..task_table import facts_of
 from .carry_segments import Carry, carries, carrying_tilt
 from .clearance import Solids
 from .demonstration_distance import deviation, end_of, length_of, shown, turning_of, way_ratio

@@ -10,8 +10,8 @@ import gymnasium as gym
 
 from ...baselines.errors import MissingExtra
 from ...configs import TrainConfig
+from ...envs import TASKS
 from ...envs.core.single_motion import HORIZON
-from ..task_table import TASKS
 from .measuring import Row, row, seconds_per_call
 
 SHARE = 0.85

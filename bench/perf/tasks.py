@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...configs.run_config import FAMILIES
-from ...envs import IDS
-from ..task_table import TASKS
+from ...envs import TASKS
 from .measuring import Row, row, seconds_per_call
 
 SWAY_STEPS = 50
@@ -116,7 +115,7 @@ def _workers() -> Row:
 def _training(task: str, name: str) -> Row:
     """Measure whole episodes of random twists at 20 Hz, resets included, as a learner uses the environment."""
     env, rng = started(task), np.random.default_rng(0)
-    actions = rng.uniform(-1.0, 1.0, (IDS[TASKS[task].id].steps, *env.action_space.shape))
+    actions = rng.uniform(-1.0, 1.0, (TASKS[task].steps, *env.action_space.shape))
 
     def episode() -> None:
         env.reset(seed=0)

@@ -192,9 +192,8 @@ def _check_sizes(recording: Recording, sizes: Mapping[str, np.ndarray]) -> None:
 
 def _task(task: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return the task of a demonstration, the names of the motions that it needs, and what to say about it."""
-    from ...envs import task_at
+    from ...envs import TASKS, task_at
     from ...envs.dotted_names import is_dotted
-    from ..task_table import TASKS
 
     if not task:
         return "", (), ()

@@ -162,13 +162,13 @@ def skill_in_task(demonstration: Demonstration, path: str) -> Skill:
 
     from ...baselines.programs.task_skills import skill_of
     from ...configs import BadConfig
+    from ...envs import TASKS, facts_of
     from ...envs.dotted_names import BadDottedName, is_dotted
-    from ..task_table import TASKS, environment_id
 
     if not is_dotted(path) and path not in TASKS:
         raise UnknownName("task", path, (*TASKS, "my_tasks:MY_TASK"))
     try:
-        env: Any = gym.make(environment_id(path))
+        env: Any = gym.make(facts_of(path, load=True).id)
     except BadDottedName as error:
         raise BadConfig("--task", path, error.reason) from None
     try:

@@ -14,13 +14,13 @@ import numpy as np
 from ...configs import RunConfig
 from ...configs.dotted_keys import leaves
 from ...configs.run_config import BESIDE, LATER
+from ...envs import TASKS
 from ..document.untrusted_text import plain
 from ..episodes.episode_records import EpisodeRecord
 from ..episodes.scenarios import place_of as drawn_from
 from ..method_table import REFERENCE, place_of
 from ..metrics.metric_table import METRICS, Metric
 from ..statistics import FEWEST, Difference, Rate, holm, mcnemar, only_one, paired_bootstrap
-from ..task_table import TASKS
 from ..workers.dispatcher import HUNG
 from .read_runs import Run
 

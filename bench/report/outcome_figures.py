@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ...envs import facts_of
 from ..drawing.figure_style import FAINT, INK, legend_above, new_figure
 from ..method_table import look_of
 from ..statistics import median
-from ..task_table import frequency_of
 from .groups import SAFE, UNSAFE, rank
 from .rate_figures import COLUMNS, HEIGHT, Series, share_axis
 
@@ -111,7 +111,7 @@ def timing(lines: list[Series]) -> Any | None:
 def timing_ticks(lines: Iterable[Series]) -> list[float]:
     """Return the tick durations in these episodes [ms], sorted and without repetition."""
     cells = [group.cell for line in lines for group in line.groups]
-    rates = {int(cell.env.get("control_frequency", frequency_of(cell.task))) for cell in cells}
+    rates = {int(cell.env.get("control_frequency", facts_of(cell.task).frequency)) for cell in cells}
     return sorted(1e3 / rate for rate in rates)
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ...configs import RunConfig
+from ...envs import facts_of
 from ..atomic_files import write_whole
 from ..episodes.episode_records import EpisodeRecord
 from ..statistics import median, wilson
-from ..task_table import facts_of
 from .groups import outcome_of
 
 SUMMARY = "summary.json"

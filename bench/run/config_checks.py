@@ -12,10 +12,10 @@ from ...baselines.own_policy import is_own
 from ...configs import BadConfig, Grid, RunConfig
 from ...configs.errors import unknown_key
 from ...configs.run_config import FAMILIES
+from ...envs import TASKS, facts_of
 from ...envs.dotted_names import BadDottedName, is_dotted
 from ...planner.errors import BadDemonstration, BadOption, UnknownName
 from ..recordings.robot_checks import robot_facts
-from ..task_table import TASKS, environment_id, facts_of
 
 if TYPE_CHECKING:
     from ...planner import Demonstration
@@ -82,7 +82,7 @@ def check_name(source: str | Path, key: str, value: Any, known: dict[str, Iterab
         return
     if key == "task" and is_dotted(value):
         try:
-            environment_id(value)
+            facts_of(value, load=True)
         except BadDottedName as error:
             raise BadConfig(source, key, str(error)) from None
         return
@@ -108,11 +108,9 @@ def check_env(cell: RunConfig, source: str | Path) -> None:
     import gymnasium as gym
     from gymnasium.envs.registration import load_env_creator
 
-    from ... import envs  # noqa: F401  (registers the ids)
-
     if not cell.env:
         return
-    name = environment_id(cell.task)
+    name = facts_of(cell.task, load=True).id
     creator = load_env_creator(str(gym.spec(name).entry_point))
     known = [key for key in signature(creator).parameters if key not in OWN_KEYS]
     for key in cell.env:

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...configs import BadConfig, RunConfig
 from ...configs.run_config import cell_of
+from ...envs import facts_of
 from ...envs.errors import NoRoom
 from ...planner import Pose
 from ...planner.errors import BadOption, OneDemoError
@@ -33,7 +34,6 @@ from ..episodes.episode_records import EpisodeRecord, known_record
 from ..episodes.run_folder import FIGURE, VIDEO
 from ..episodes.scenarios import Scenario, ScenarioChanged, scenarios_of
 from ..method_table import WITHOUT_DEMONSTRATION
-from ..task_table import environment_id, frequency_of, seconds_of
 from ..workers.dispatcher import ERROR, Answer, Job
 from ..workers.worker_process import main
 
@@ -112,7 +112,8 @@ def environment_key(config: RunConfig) -> str:
 
 def action_limit(config: RunConfig) -> int:
     """Return the time limit of an episode in actions."""
-    seconds, usual = seconds_of(config.task), frequency_of(config.task)
+    facts = facts_of(config.task, load=True)
+    seconds, usual = facts.seconds, facts.frequency
     wanted = seconds if config.max_seconds is None else config.max_seconds
     # the environment refuses invalid frequencies
     rate = config.env.get("control_frequency", usual)
@@ -128,13 +129,12 @@ def made(config: RunConfig, render_mode: str | None = None) -> Any:
     """
     import gymnasium as gym
 
-    from ... import envs  # noqa: F401  (registers the ids)
     from ...baselines.warm_up import warm_up_for
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env: Any = gym.make(
-            environment_id(config.task),
+            facts_of(config.task, load=True).id,
             robot=config.robot,
             level=config.level,
             obstacles=config.obstacles,

@@ -11,9 +11,9 @@ from ...baselines import AroundScrew, Features, FlatFeatures, measured_normaliza
 from ...baselines.learning.feature_scaling import Normalization
 from ...baselines.learning.features import OBSTACLE
 from ...configs import TrainConfig, load_demonstration
+from ...envs import facts_of
 from ...envs.core.single_motion import LAST_ACTION
 from ...planner import Demonstration
-from ..task_table import environment_id
 
 GOALS = ("achieved_goal", "desired_goal")
 MEASURED_EPISODES, MEASURED_STEPS = 20, 75
@@ -65,7 +65,7 @@ def base_env(config: TrainConfig, **options: Any) -> Any:
         arguments["control_mode"] = "joint_velocity"
     if config.algorithm == "sac-her":
         arguments |= {"goal_form": True, "reward": "sparse"}
-    return gym.make(environment_id(config.task), **{**arguments, **options})
+    return gym.make(facts_of(config.task, load=True).id, **{**arguments, **options})
 
 
 def seen_env(config: TrainConfig) -> Any:

@@ -13,8 +13,10 @@ import numpy as np
 
 from ...planner import Obstacle, Pose
 from ...planner.errors import BadOption
-from ...planner.skills.skill import SegmentedSkill
 from ..errors import BadAction, NoRoom
+from ..facts.page import Page
+from ..facts.task_facts import TaskFacts
+from ..judge.progress import Progress
 from ..scene.robot_description import robot_parts
 from ..scene.robots import Robot
 from ..scene.scene import OBSTACLE, CompiledScene, compiled_scene
@@ -29,7 +31,6 @@ from .description import TaskDescription, TaskFurniture, TaskObject
 from .levels import checked_obstacles, level_named
 from .obstacle_placement import placed
 from .placement_context import ObstacleRequest, PlacementContext, PlacementMotion
-from .progress import Progress
 from .reset_options import checked_choice
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
@@ -57,11 +58,11 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         scene: scene compiled elsewhere; None: that of the robot and the things.
         view: camera view.
 
-    All environments share the other arguments and describe them in their docstrings.
+    All environments share the other arguments: `print(env.unwrapped.__doc__)` is the page of a made environment.
     """
 
-    SKILL: SegmentedSkill | None = None
-    """What the segments of the task's demonstration mean; None: its skill is found in the demonstration."""
+    FACTS: TaskFacts
+    """Facts about the task, its documentation among them."""
 
     _goal_pose: np.ndarray
     _progress: ProgressT
@@ -107,9 +108,10 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
         self._task = self._described(name, things)
         widths, objects = self._task.gripper_width, len(self._task.objects)
-        self.observation_space = space.observation_space(
+        self.observation_space: Any = space.observation_space(
             self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
         )
+        self.boxes = self.observation_space.spaces
 
     def _described(self, name: str, things: SceneSpec) -> TaskDescription:
         parts = robot_parts(self.sim.scene)
@@ -127,8 +129,12 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
             touching=parts.touching,
             obstacles=SLOTS,
             control_mode=self.control_mode,
-            skill=self.SKILL,
+            skill=self.FACTS.skill,
         )
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.__doc__ = Page(str(cls.__doc__))  # type: ignore[assignment]
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what makes a twin, in this process or another: all but an open image or window."""

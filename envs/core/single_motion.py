@@ -53,6 +53,7 @@ class SingleMotionEnv(TaskEnv[ProgressT]):
         seen: Any = self.observation_space
         # the servos respond some actions late: without the last action a learner sees only half of the state
         self.observation_space: Any = gym.spaces.Dict({**seen.spaces, LAST_ACTION: self.action_space})
+        self.boxes = self.observation_space.spaces
         self._check_way(level_named(self.level).obstacles if self.obstacles is None else self.obstacles)
         dense = self.reward_kind == "dense" or goal_form
         self.ends_on_success = not dense if end_on_success is None else end_on_success
@@ -127,33 +128,3 @@ class SingleMotionEnv(TaskEnv[ProgressT]):
             "achieved_goal": self.achieved_goal(state),
             "desired_goal": self.desired_goal(),
         }
-
-
-def turned_by(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) -> np.ndarray:
-    """Return the angles (...) [rad] between quaternions, wxyz.
-
-    Args:
-        achieved: (..., 4) quaternions.
-        desired: (..., 4) quaternions.
-        half_turns: whether half turns about the own z axis are ignored.
-    """
-    w = np.abs((achieved * desired).sum(axis=-1))
-    if half_turns:
-        # the last entry of the product conj(achieved) desired
-        a, b = np.moveaxis(achieved, -1, 0), np.moveaxis(desired, -1, 0)
-        w = np.maximum(w, np.abs(a[0] * b[3] - a[3] * b[0] - a[1] * b[2] + a[2] * b[1]))
-    norms = np.linalg.norm(achieved, axis=-1) * np.linalg.norm(desired, axis=-1)
-    return 2.0 * np.arccos(np.clip(w / np.maximum(norms, 1e-12), 0.0, 1.0))
-
-
-def gaps(achieved: np.ndarray, desired: np.ndarray, *, half_turns: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances (...) [m] and angles (...) [rad] between poses.
-
-    Args:
-        achieved: (..., 7) poses, x y z [m] and wxyz.
-        desired: (..., 7) poses, likewise.
-        half_turns: whether half turns about the own z axis are ignored.
-    """
-    angle = turned_by(achieved[..., 3:7], desired[..., 3:7], half_turns=half_turns)
-    distance = np.linalg.norm(achieved[..., :3] - desired[..., :3], axis=-1)
-    return distance, angle

@@ -6,6 +6,7 @@ import copy
 from typing import Any
 
 import gymnasium as gym
+from gymnasium.envs.registration import WrapperSpec
 from gymnasium.utils import RecordConstructorArgs
 
 
@@ -21,3 +22,7 @@ class WholeCopies(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
     def __copy__(self) -> WholeCopies:
         return copy.deepcopy(self)
+
+
+WHOLE_COPIES = WrapperSpec("WholeCopies", f"{__name__}:WholeCopies", {})
+"""The wrapper in the words of Gymnasium's registry."""

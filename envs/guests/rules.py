@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.progress import Progress
+from ..judge.progress import Progress
 from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, FURNITURE, OBSTACLE, WORLD
 from ..simulation.state import State
 from .guest_scene import HAND

@@ -22,9 +22,9 @@ from ..scene.scene_objects import Beads, Glass, SceneSpec
 from ..simulation.render import View
 from ..simulation.simulation import Start
 from ..simulation.state import State
-from .geometry import SOURCE, TARGET, level_hand
+from .facts import BIMANUAL_POUR, SOURCE, TARGET
+from .geometry import level_hand
 from .rules import PourProgress
-from .skill import BIMANUAL_SKILL
 
 ARMS = ("right", "left")
 """Names of the arms: the right hand holds the source, the left one the target."""
@@ -76,81 +76,9 @@ RANGES = {
 
 
 class BimanualPourEnv(TaskEnv[PourProgress]):
-    """Pour the beads of one glass into another, each held by one arm of Baxter from the start.
+    """Pour the beads of one glass into another, each held by one arm of Baxter from the start."""
 
-    ## Description
-    The right hand holds the source (46 mm wide, 120 mm high, 80 g) with 30 beads of 12 mm and 1 g that represent
-    water, the left hand the target (54 mm wide, 100 mm high). Only friction holds the glasses between the fingers,
-    and the beads move by gravity. The place of pouring is free. Success is judged from the simulator: for half a
-    second at least 90 % of the beads are in the target and at most 5 % outside both glasses, and the target is
-    upright and at rest.
-
-    ## Action Space
-    `Box(-1, 1, (16,), float64)` at 50 Hz, right arm first; `(14,)` with `control_mode="ee_twist"`.
-
-    | control mode | entry of each arm | meaning |
-    |---|---|---|
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes. Poses are `x y z [m]`, then quaternion wxyz. A glass's frame is at the center of its
-    axis, z up.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (2, 7) | [rad]; right arm, left arm |
-    | `joint_velocities` | (2, 7) | [rad/s] |
-    | `tcp_pose` | (2, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (2,) | gap between the finger pads [m] |
-    | `object_pose` | (2, 7) | source and target |
-    | `goal_pose` | (1, 7) | center of the target's rim at the start; constant during an episode |
-    | `bead_fraction` | (3,) | share of the beads in the source, in the target, outside both |
-    | `motion_index` | (1,) | 1 while the source is held, 2 while enough beads are poured |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-
-    ## Rewards
-    `reward="dense"`: in [0, 1], half of it the share of the beads in the target, the other half for holding the
-    source and bringing it to the target, kept once beads are poured; 1 with success. `reward="sparse"`: 1 with
-    success.
-
-    ## Starting State
-    The glasses are upright in the hands. By `level`: L0 the nominal places; L1 each glass moved by up to 5 cm in x, y
-    and z and its hand turned by up to 15 degrees about the vertical; L2 by 15 cm and 60 degrees. A start is drawn
-    anew if an arm cannot reach it from its ready posture with 0.1 rad to all joint limits and 3 cm to trunk and
-    table, or if the glasses are less than 22 cm apart.
-
-    L3, L4 and F are L2 with obstacles on the source's straight path to the target's initial place: see
-    `onedemo/Pour-v0`. R, S and T start as L1 does.
-
-    ## Episode End
-    `terminated` with a settled success, when a glass has fallen, or when more than 5 % of the beads lie on the table
-    or below. `truncated` after 40 s (Gymnasium's `TimeLimit`).
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far; contacts of an arm with itself are ignored), `stage`,
-    `failure_reason`, `collision`, `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m],
-    `layouts_refused`, `fraction_in_target`, `fraction_outside`, `carry_tilt` [rad] (largest tilt of the source before
-    its rim came within 15 cm of the target's axis) and `beads_lost` (most beads outside both glasses until then).
-
-    ## Arguments
-    `robot="Baxter"`, `level="L1"`, `obstacles=None` (those of the level) or `"none" | "static" | "appear" |
-    "moving" | "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
-    `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`,
-    `obstacles` (a kind, or a list of `ScheduledObstacle`) and `joint_positions` (2, 7), which must hold the
-    glasses upright.
-
-    ## Version History
-    * v0: first version.
-    """
-
-    SKILL = BIMANUAL_SKILL
+    FACTS = BIMANUAL_POUR
 
     def __init__(
         self,

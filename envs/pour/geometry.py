@@ -11,8 +11,6 @@ import numpy as np
 from ...planner import Cylinder, Pose
 from ..scene.scene_objects import Beads, Color, FixedShape, Furniture, Glass
 
-SOURCE, TARGET = 0, 1
-"""Indices of the two glasses."""
 GLASSES = (Glass("source", radius=0.030), Glass("target", radius=0.043))
 """Glasses that the Panda pours from and into; other grippers may need another source, see `places`."""
 BEADS = Beads()

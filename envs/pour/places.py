@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from ..scene.robots import Joints
 from ..scene.scene_objects import Glass
-from .geometry import GLASSES, SOURCE
+from .facts import SOURCE
+from .geometry import GLASSES
 
 Place = tuple[float, float, float]
 

@@ -22,11 +22,11 @@ from ..scene.scene_objects import SceneSpec
 from ..simulation.render import View
 from ..simulation.simulation import Start
 from ..simulation.state import State
-from .geometry import BACK, BEADS, GLASSES, SOURCE, STANDS, TARGET, TILTED, UP, grasp, pouring, tcp_from_glass
+from .facts import POUR, SOURCE, TARGET
+from .geometry import BACK, BEADS, GLASSES, STANDS, TILTED, UP, grasp, pouring, tcp_from_glass
 from .layout import GAP, LONG_GAP, RANGES, checked_stands, pour_layout
 from .places import POUR_PLACES
 from .rules import PourProgress
-from .skill import POUR_SKILL
 
 OPTIONS = ("level", "obstacles", "stands", "joint_positions")
 RAISED, ABOVE = 0.12, (0.0, 0.04, 0.08)
@@ -43,86 +43,9 @@ VIEW = View((-0.14, -0.02, 1.06), 1.42, 150.0, -17.0)
 
 
 class PourEnv(TaskEnv[PourProgress]):
-    """Pour the beads of one glass into another with one arm.
+    """Pour the beads of one glass into another with one arm."""
 
-    ## Description
-    Two glasses stand on stands on a table: the source (60 mm wide, 100 mm high, 80 g; 46 mm wide for grippers that
-    hold or clear no wider one) with 30 beads of 12 mm and 1 g that represent water, and the target (86 mm wide, 100 mm
-    high). The source must be fetched, carried and emptied into the target. Only friction holds it between the fingers,
-    and the beads move by gravity. Success is judged from the simulator: for half a second at least 90 % of the beads
-    are in the target and at most 5 % outside both glasses, and the target is upright and at rest.
-
-    ## Action Space
-    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes. Poses are `x y z [m]`, then quaternion wxyz. A glass's frame is at the center of its
-    axis, z up; a stand's is at the center of its top.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (2, 7) | source and target |
-    | `goal_pose` | (1, 7) | center of the target's rim at the start; constant during an episode |
-    | `furniture_pose` | (2, 7) | stands of source and target; constant during an episode |
-    | `bead_fraction` | (3,) | share of the beads in the source, in the target, outside both |
-    | `motion_index` | (1,) | 0 while the source is to be fetched, 1 while it is held, 2 while enough beads are poured |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-
-    ## Rewards
-    `reward="dense"`: in [0, 1], half of it the share of the beads in the target, the other half for reaching,
-    holding and carrying the source, kept once beads are poured; 1 with success. `reward="sparse"`: 1 with success.
-
-    ## Starting State
-    By `level`: L0 the robot's nominal places; L1 the source moved by up to 5 cm and the target by up to 10 cm in x and
-    y, start joints by up to 0.05 rad; L2 by 15 cm, 20 cm and 0.15 rad, each stand 10 to 30 cm high instead of 15. The
-    glasses' axes are at least 20 cm apart and 0.35 to 0.72 m from the arm's base axis, the arm at least 3 cm from
-    everything. No yaw is drawn: a round glass has none. With `pregrasped=True` the
-    fingers are closed around the source on its stand.
-
-    L3, L4 and F are L2 with obstacles: L3 has one to three static ones of 3 to 10 cm on the source's path from its
-    stand to the target, L4 one that swings across the path at up to 0.3 m/s or appears during the carry, F a static
-    one where the forearm passes. R, S and T start as L1 does. Obstacles are solid. They overlap the volume that hand
-    and glass sweep on the straight path, and leave clearance at the start, at the grasp and while pouring.
-
-    ## Episode End
-    `terminated` with a settled success, when a glass has fallen off the table, or when more than 5 % of the beads lie
-    on the table or below. `truncated` after 40 s (Gymnasium's `TimeLimit`).
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
-    the held object), `layouts_refused` (starts that had no space for the obstacles), `fraction_in_target`,
-    `fraction_outside`, `carry_tilt` [rad] (largest tilt of the lifted source before its rim came within 15 cm of the
-    target's axis) and `beads_lost` (most beads outside both glasses until then).
-
-    ## Arguments
-    `robot="Panda"` (others: `onedemo.envs.pour.places.POUR_PLACES`; Baxter's right arm), `pregrasped=False`,
-    `stands=None` or (2, 3) nominal x, y, z [m] of the stands' tops, source first, `ready=None` or (7,) nominal start
-    joints [rad], `level="L1"`, `obstacles=None` (those of the level) or `"none" | "static" | "appear" | "moving" |
-    "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`, `reward="sparse" | "dense"`,
-    `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`. `reset(options=...)` takes `level`, `obstacles`
-    (a kind, or a list of `ScheduledObstacle`), `stands` (2, 3) exact tops of the stands, and `joint_positions` (7,).
-
-    ## Version History
-    * v0: first version.
-    """
-
-    SKILL = POUR_SKILL
+    FACTS = POUR
 
     def __init__(
         self,

@@ -12,11 +12,13 @@ import numpy as np
 
 from ...planner.geometry import screw
 from ...planner.jit import kernel
-from ..core.progress import Progress
-from ..scene.scene import ARM, BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OTHER_ARM, OTHER_FINGERS
+from ..judge.goal_progress import contacts
+from ..judge.judge import unwanted_contacts
+from ..judge.progress import Progress
+from ..scene.scene import BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OTHER_FINGERS
 from ..scene.scene_objects import TABLE_HEIGHT
 from ..simulation.state import State
-from .geometry import SOURCE, TARGET
+from .facts import SOURCE, TARGET
 
 ENOUGH, SPILLED = 0.9, 0.05
 """Least share of the beads in the target, and largest share outside both glasses, for success."""
@@ -107,32 +109,6 @@ def tilt_of(pose):
 
 
 @kernel
-def allowed_contact(low, high, at_home):
-    """Return whether two owners may touch.
-
-    Wanted contacts are the fingers on the source, a second arm's fingers on the target, the source on its stand while
-    at its initial place, and the target on its stand. Beads may touch anything: their final places are judged
-    separately. A robot's contacts with itself are ignored.
-
-    Args:
-        low: smaller owner, see `WORLD` in `scene`.
-        high: larger owner.
-        at_home: whether the source is at its initial place.
-    """
-    if low in (high, BEAD) or high == BEAD or (low == ARM and high == FINGERS):
-        return True
-    if low == OTHER_ARM and high == OTHER_FINGERS:
-        return True
-    if low == FINGERS:
-        return high == FIRST_OBJECT + SOURCE
-    if low == OTHER_FINGERS:
-        return high == FIRST_OBJECT + TARGET
-    if low == FURNITURE:
-        return high == FIRST_OBJECT + TARGET or (at_home and high == FIRST_OBJECT + SOURCE)
-    return False
-
-
-@kernel
 def rim_gap(pose, height, other):
     """Return the horizontal distance [m] from the center of a glass's rim to another glass's axis.
 
@@ -146,7 +122,7 @@ def rim_gap(pose, height, other):
 
 
 @kernel
-def judge_state(poses, velocities, beads, touching, sizes, memory):
+def judge_beads(poses, velocities, beads, touching, sizes, allowed, memory):
     """Judge a state; return the entries of a `PourVerdict`.
 
     Args:
@@ -155,6 +131,7 @@ def judge_state(poses, velocities, beads, touching, sizes, memory):
         beads: (n, 3) positions of the beads [m].
         touching: (owners, owners) contacts, see `State`.
         sizes: (2, 2) radius and height [m] of both glasses.
+        allowed: (owners, owners) wanted contacts, see `pour_contacts`; updated for the source at its initial place.
         memory: (7,) see `MEMORY`; updated.
     """
     n, source, target = len(beads), poses[SOURCE], poses[TARGET]
@@ -177,12 +154,20 @@ def judge_state(poses, velocities, beads, touching, sizes, memory):
     dropped = memory[MEMORY.was_lifted] != 0.0 and not held and tilt_of(source) > TOPPLED
     fallen = source[2] < LOWEST or target[2] < LOWEST
     at_home = math.hypot(source[0] - memory[MEMORY.x], source[1] - memory[MEMORY.y]) < HOME
-    unwanted, low, high = 0, -1, -1
-    for a in range(len(touching)):
-        for b in range(a, len(touching)):
-            if touching[a, b] != 0.0 and not allowed_contact(a, b, at_home):
-                unwanted, low, high = unwanted + 1, a, b
+    allowed[FURNITURE, FIRST_OBJECT + SOURCE] = 1.0 if at_home else 0.0
+    unwanted, low, high = unwanted_contacts(touching, allowed, -1)
     return inside, poured, lying, int(held), int(done), int(dropped), int(fallen), unwanted, low, high
+
+
+def pour_contacts() -> np.ndarray:
+    """Return the wanted contacts (owners, owners), the source away from its initial place.
+
+    These are the fingers on the source, a second arm's fingers on the target, and the target on its stand; at its
+    initial place, the source on its stand, too. Beads may touch anything: their final places are judged separately.
+    """
+    source, target = FIRST_OBJECT + SOURCE, FIRST_OBJECT + TARGET
+    beads = [(min(each, BEAD), max(each, BEAD)) for each in range(target + 1)]
+    return contacts(2, [(FINGERS, source), (OTHER_FINGERS, target), (FURNITURE, target), *beads])
 
 
 class PourProgress(Progress):
@@ -199,7 +184,7 @@ class PourProgress(Progress):
     def __init__(self, start: np.ndarray, sizes: np.ndarray, beads: int, dt: float, *, in_hand: bool = False):
         super().__init__(dt)
         self.count, self._sizes = beads, sizes
-        self._memory = np.zeros(MEMORY.width)
+        self._memory, self._allowed = np.zeros(MEMORY.width), pour_contacts()
         self._memory[MEMORY.x : MEMORY.z + 1], self._memory[MEMORY.was_lifted] = start[SOURCE, :3], float(in_hand)
         self.verdict = PourVerdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
 
@@ -242,7 +227,9 @@ class PourProgress(Progress):
     def update(self, state: State) -> PourVerdict:
         """See `Progress`."""
         poses, moving, beads = state.object_pose, state.object_velocity, state.bead_position
-        self.verdict = PourVerdict(*judge_state(poses, moving, beads, state.touching, self._sizes, self._memory))
+        self.verdict = PourVerdict(
+            *judge_beads(poses, moving, beads, state.touching, self._sizes, self._allowed, self._memory)
+        )
         self._settle(self.verdict.done == 1, self.verdict)
         return self.verdict
 

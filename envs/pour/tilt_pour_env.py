@@ -8,14 +8,15 @@ import numpy as np
 
 from ...planner import Pose
 from ...planner.errors import BadOption
-from ..core.dense_reward import near, tilting
 from ..core.grasped_start import SQUEEZE, can_follow, holding_joints
 from ..core.reset_options import check_known, checked_joints
 from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
+from ..judge.dense_reward import near, tilting
 from ..scene.beads import poured_into
 from ..simulation.simulation import Start
 from ..simulation.state import State
-from .geometry import BACK, BEADS, SOURCE, TARGET, TILTED, UP, pouring, tcp_from_glass
+from .facts import SOURCE, TARGET, TILT_POUR
+from .geometry import BACK, BEADS, TILTED, UP, pouring, tcp_from_glass
 from .layout import GAP, RANGES, checked_stands, pour_layout
 from .pour_env import PourEnv
 from .rules import ENOUGH, SPILLED, PourProgress, rim_gap, tilt_of
@@ -44,83 +45,9 @@ class TiltProgress(PourProgress):
 
 
 class TiltPourEnv(SingleMotionEnv[PourProgress], PourEnv):
-    """Empty the glass in the hand into the one in front of it.
+    """Empty the glass in the hand into the one in front of it."""
 
-    ## Description
-    The source glass, with 30 beads of 12 mm and 1 g that represent water, is in the hand, upright, in front of and
-    above the target glass, held only by friction between the fingers. It must be tilted so that the beads fall into
-    the target. Success is judged from the simulator as in `onedemo/Pour-v0`: for half a second at least 90 % of the
-    beads are in the target and at most 5 % outside both glasses, and the target is upright and at rest.
-
-    ## Action Space
-    `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (2, 7) | source and target; a glass's frame is at the center of its axis, z up |
-    | `goal_pose` | (1, 7) | center of the target's rim at the start; constant during an episode |
-    | `furniture_pose` | (2, 7) | stands of source and target; constant during an episode |
-    | `bead_fraction` | (3,) | share of the beads in the source, in the target, outside both |
-    | `motion_index` | (1,) | 1 while the source is held, 2 while enough beads are poured, 0 once it is released |
-    | `obstacle_active` | (3,) | 0: there is no obstacle |
-    | `obstacle_shape` | (3,) | 0 |
-    | `obstacle_size` | (3, 3) | 0 |
-    | `obstacle_pose` | (3, 7) | 0 |
-    | `obstacle_velocity` | (3, 3) | 0 |
-    | `last_action` | that of the action | last action; zeros at the start |
-
-    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
-    vector), `achieved_goal` and `desired_goal`
-    (2,): shares of the beads in the target and outside both glasses; 1 and 0.
-    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
-
-    ## Rewards
-    `reward="dense"` (default): in [0, 1], half of it the share of the beads in the target, the other half for holding
-    the source over the target and tilting it there. `reward="sparse"`: 1 with success, else 0.
-
-    ## Starting State
-    By `level`: the target stands as in `onedemo/Pour-v0`, moved by up to 10 cm (L1) or 20 cm and 10 to 30 cm high (L2);
-    the source's lip is 6 cm behind the pour point and 8 cm above it, moved by up to 3 cm (L1) or 6 cm (L2) in x, y and
-    z. L0 is the nominal place; R, S and T start as L1 does. The motion is too short for obstacles: L3, L4 and F do
-    not exist.
-
-    ## Episode End
-    `terminated` when a glass has fallen off the table, or when more than 5 % of the beads lie on it or below.
-    `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
-    `control_frequency`). A settled success ends the episode with
-    `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts`, `min_obstacle_distance` [m], `layouts_refused`, `fraction_in_target`, `fraction_outside`,
-    `carry_tilt` [rad], `beads_lost`.
-
-    ## Arguments
-    `robot="Panda"` (Baxter and every robot of `onedemo/Pour-v0`), `level="L1"`, `obstacles=None` or `"none"`,
-    `control_mode="ee_twist" | "joint_velocity"`, `reward="dense" | "sparse"`, `control_frequency=20` (10, 20, 25 or 50:
-    any that divides 500), `goal_form=False`, `end_on_success=None`, `render_mode=None | "rgb_array" | "human"`.
-    `reset(options=...)` takes `level`, `stands` (2, 3) exact tops of the stands, and `joint_positions` (7,), which the
-    glass follows.
-
-    ## Version History
-    * v0: first version.
-    """
-
+    FACTS = TILT_POUR
     GOAL_BOUNDS = (1.0, 1.0)
 
     def __init__(

@@ -13,18 +13,19 @@ from ..core.environment import MAX_LAYOUTS, Observation, TaskEnv
 from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_choice, checked_joints
 from ..core.spaces import pose_box
+from ..judge.goal_progress import GoalProgress
 from ..scene.body_clearance import arm_clearance
 from ..scene.robots import places_of, robot_named
 from ..scene.scene_objects import SceneSpec
 from ..simulation.render import Ghost, View
 from ..simulation.simulation import Start
 from ..simulation.state import State
+from .facts import SHELVE
 from .layout import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
 from .options import OPTIONS, given_layout
 from .parts import BOOK_SIZE, SHELVES, books, cupboard, stand
 from .places import SHELF_PLACES
-from .rules import ShelveProgress
-from .skill import SHELVE_SKILL
+from .rules import hand_over, shelve_rules
 
 VIEW = View(look_at=(-0.05, -0.06, 1.13), distance=1.4, azimuth=98.0, elevation=-17.0)
 LIFT, INSERTION_DEPTH = 0.15, 0.22
@@ -42,94 +43,10 @@ PAPER_SIZES = (0.06, 0.09)
 """Sizes of the obstacles that appear while the second and the third book are placed [m]."""
 
 
-class ShelveEnv(TaskEnv[ShelveProgress]):
-    """Shelve three books in the upper shelf of a cluttered cupboard, with one arm.
+class ShelveEnv(TaskEnv[GoalProgress]):
+    """Shelve three books in the upper shelf of a cluttered cupboard, with one arm."""
 
-    ## Description
-    A cupboard with two shelves stands on a table, turned so that the robot reaches it: for the Panda, books go in
-    along a yaw of about 75 degrees; other books stand in it. Three books (160 x 220 x 35 mm, 0.3 kg) are handed over
-    one at a time on a stand at about shelf height, lying, spine over its edge. They must be put upright, spine to the
-    front, into three slots 70 mm apart. Only friction holds them between the fingers.
-
-    A human would hand the books over; the environment plays this part: later books wait in a pile on the table. Once
-    a book is in its slot and released, and the whole robot is 8 cm away from the next book's place on the stand, the
-    next book moves from the pile to the stand at once. The robot never touches a book that is moved like this.
-    Everything else is physics.
-
-    Success is judged from the simulator: for half a second every book is within 10 mm and 5 degrees of its slot,
-    touched by no finger and at rest, the hand has withdrawn by 15 cm, and no clutter book was moved by more than 5 cm
-    or turned by more than 15 degrees.
-
-    ## Action Space
-    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or books. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n + 5, 7) | the books, then the clutter; a book's x points away from its spine, z along it |
-    | `goal_pose` | (n, 7) | goal of each book; constant during an episode |
-    | `furniture_pose` | (3, 7) | cupboard, stand and the stand's foot; constant during an episode |
-    | `motion_index` | (1,) | 2k while book k is to be fetched, 2k + 1 while it is held, 2n when all are shelved |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-
-    ## Rewards
-    `reward="dense"`: in [0, 1], the completed share of the task, including reaching, grasping and carrying of the
-    current book. `reward="sparse"`: 1 with success, else 0.
-
-    ## Starting State
-    By `level`: L0 the nominal places; L1 the stand moved by up to 4 cm, 5 cm lower to 2.5 cm higher, turned by up to
-    10 degrees, the cupboard by up to 1 cm and 5 degrees, the slots by up to 15 mm along the shelf, books by up to
-    3 mm and 2 degrees on the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm higher, 15
-    degrees, 2 cm and 15 degrees, 30 mm, 5 mm and 4 degrees, 0.1 rad. Each robot has its own nominal places.
-
-    L3, L4 and F are L2 with obstacles: L3 has one to three static ones of 3 to 10 cm on the path from stand to
-    cupboard, L4 one that swings across the path at up to 0.3 m/s or appears during a carry, F a static one where the
-    forearm passes. R, S and T start as L1 does. Obstacles are solid. They overlap the volume that hand and book sweep
-    on the straight path, and leave clearance at the start, at every grasp and at every slot, for any method.
-
-    ## Episode End
-    `terminated` with a settled success, or when a book has fallen off the table. `truncated` after 90 s (Gymnasium's
-    `TimeLimit`).
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
-    the held object), `layouts_refused` (starts that had no space for the obstacles), `books_placed`,
-    `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`.
-
-    ## Arguments
-    `robot="Panda"` (others: `onedemo.envs.shelve.places.SHELF_PLACES`; Baxter's right arm), `n_books=3` (1 to 3),
-    `shelf="upper" | "lower"` (the demonstration was given in the lower one), `level="L1"`, `obstacles=None` (those of
-    the level) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"` (two of different
-    size appear while the last two books are carried), `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`.
-    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `ScheduledObstacle`), `stand_pose` (7,),
-    `cupboard_pose` (7,), `slots` (shift along the shelf [m]), `books` (n, 3: x, y [m] and yaw [rad] of each on the
-    stand, from its middle), `clutter` (5, 2: gaps [m] from neighbor or wall, and from the front) and
-    `joint_positions` (7,).
-
-    ## Version History
-    * v0: first version.
-    """
-
-    SKILL = SHELVE_SKILL
+    FACTS = SHELVE
 
     def __init__(
         self,
@@ -165,14 +82,15 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
             view=VIEW,
             more={"furniture_pose": pose_box(len(furniture))},
         )
-        self._ready = np.array([self._places.ready])
+        self._ready, self._rules = np.array([self._places.ready]), shelve_rules(n_books)
         self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], self._places, n_books, self._ready.shape)
         self._take_layout(self._drawn)
 
     def _take_layout(self, drawn: ShelfLayout) -> None:
         self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
         self._furniture = drawn.furniture()
-        self._progress = ShelveProgress(self._goal_pose, drawn.objects(), self.control_dt)
+        self._handed = 1
+        self._progress = GoalProgress(self._rules, self._goal_pose, drawn.objects(), self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
@@ -196,7 +114,7 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Apply an action for one control step; afterwards hand over the next book if it is due."""
         reached = super().step(action)
-        k = self._progress.handed
+        k = self._handed
         if (
             k < self.n_books
             and self._progress.placed == k
@@ -204,7 +122,8 @@ class ShelveEnv(TaskEnv[ShelveProgress]):
         ):
             pose = self._drawn.handed(k).vector
             self.sim.put(k, pose)
-            self._progress.hand_over(pose)
+            hand_over(self._progress, k, pose)
+            self._handed += 1
         return reached
 
     def _is_clear(self, place: Pose, joints: np.ndarray, clearance: float) -> bool:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...planner.errors import BadOption
-from ..core.dense_reward import closeness, placing
 from ..core.grasped_start import SQUEEZE, holding_joints
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import checked_choice, checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
 from ..core.spaces import REACH
+from ..judge.dense_reward import closeness, gaps
+from ..judge.goal_progress import GoalProgress, one_placed
 from ..simulation.simulation import Start
 from ..simulation.state import State
+from .facts import PLACE_ONE
 from .grasps import block_grasps
-from .rules import BLOCK, MAX_HEIGHT, MAX_OFFSET, MAX_YAW, WITHDRAWN, StackProgress
+from .rules import BLOCK, MAX_HEIGHT, MAX_OFFSET, MAX_YAW, WITHDRAWN
 from .stack_env import StackEnv
 
 ONTO = ("table", "block")
@@ -27,96 +30,14 @@ UP = 0.008
 MAX_STARTS = 200
 
 
-class PlaceProgress(StackProgress):
-    """Progress of placing the last block, which may be in the hand from the start."""
-
-    def reward(self, state: State) -> float:
-        """See `Progress`."""
-        pose, goal, tcp = state.object_pose[-1], self._goals[-1], state.tcp_pose[0]
-        distance, angle = gaps(pose, goal, half_turns=True)
-        reach = float(np.linalg.norm(pose[:3] - tcp[:3]))
-        away = min(1.0, reach / WITHDRAWN)
-        return float(placing(reach, float(distance), float(angle), self.held, self.placed == self.n_blocks, away))
+BY_HAND = partial(one_placed, k=-1, half_turns=True)
+"""Dense reward of the last block."""
 
 
-class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
-    """Put the block in the hand at its goal, on the table or on another block.
+class PlaceOneEnv(SingleMotionEnv[GoalProgress], StackEnv):
+    """Put the block in the hand at its goal, on the table or on another block."""
 
-    ## Description
-    A wooden block (60 x 40 x 50 mm, 72 g) is in the hand, held only by friction between the fingers. It must be put at
-    its goal and released, and the hand withdrawn by 5 cm. Success is judged from the simulator as in
-    `onedemo/Stack-v0`: for half a second the block is within 10 mm horizontally, 10 degrees of yaw (a block looks the
-    same after half a turn) and 5 mm in height of its goal, touched by no finger and at rest.
-
-    ## Action Space
-    `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n, 7) | with `onto="block"` the block already in place, then the one to place |
-    | `goal_pose` | (n, 7) | goal of each block; constant during an episode |
-    | `motion_index` | (1,) | 2k while block k is to be fetched, 2k + 1 while it is held, 2n when all are placed |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-    | `last_action` | that of the action | last action; zeros at the start |
-
-    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
-    vector), `achieved_goal` and `desired_goal`
-    (8,): pose of the block, and 1 once it is released and the hand is 5 cm away, else 0; its goal and 1.
-    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
-
-    ## Rewards
-    `reward="dense"` (default): in [0, 1]: up to 0.75 for bringing the held block to its goal, from 0.75 to 1 for
-    withdrawing once it stands there. `reward="sparse"`: 1 with success, else 0.
-
-    ## Starting State
-    By `level`: L0 the nominal place; L1 the block moved by up to 10 cm and turned by up to 30 degrees, its goal by up
-    to 5 cm and 30 degrees, held 8 to 16 cm above the table; L2 up to 20 cm, 10 cm, 120 degrees, 6 to 20 cm. L3, L4 and
-    F are L2 with obstacles on the block's path, see `onedemo/Stack-v0`. R, S and T start as L1 does. With
-    `pregrasped=False` the block stands on the table and the hand is at its ready posture; give `max_episode_steps=300`.
-
-    ## Episode End
-    `terminated` when a block has fallen off the table.
-    `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
-    `control_frequency`). A settled success ends the episode with
-    `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m], `layouts_refused`, `blocks_placed`,
-    `position_error` (n,) [m], `yaw_error` (n,) [rad].
-
-    ## Arguments
-    `robot="Panda"` (Baxter and every robot of `onedemo/Stack-v0`), `onto="table" | "block"`, `pregrasped=True`,
-    `level="L1"`, `obstacles=None` (those of the level) or `"none" | "static" | "appear" | "moving" | "unforeseen" |
-    "forearm"`, `control_mode="ee_twist" | "joint_velocity"`, `reward="dense" | "sparse"`, `control_frequency=20` (10,
-    20, 25 or 50: any that divides 500), `goal_form=False`, `end_on_success=None`, `render_mode=None | "rgb_array" |
-    "human"`, `arm=None`. `reset(options=...)` takes `level`, `obstacles`, `object_poses` (n, 7; a block in the hand
-    is held there), `base_pose` (7,) of the lowest goal, and `joint_positions` (7,), which a block in the hand
-    follows.
-
-    ## Version History
-    * v0: first version.
-    """
-
+    FACTS = PLACE_ONE
     GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(
@@ -148,7 +69,6 @@ class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
             render_mode=render_mode,
             arm=arm,
         )
-        self._progress = PlaceProgress(self._goal_pose, self._goal_pose, self.control_dt)
         self._take_form("place_one", goal_form, end_on_success)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
@@ -163,7 +83,8 @@ class PlaceOneEnv(SingleMotionEnv[StackProgress], StackEnv):
                 if found is None:
                     continue
                 joints = found
-            self._progress = PlaceProgress(self._goal_pose, start.objects, self.control_dt, in_hand=self.pregrasped)
+            held, dt = self.n_blocks - 1 if self.pregrasped else None, self.control_dt
+            self._progress = GoalProgress(self._rules, self._goal_pose, start.objects, dt, in_hand=held, dense=BY_HAND)
             return Start(joints, poses, grips=grips)
         raise BadOption("object_poses", "the hand cannot hold the block there")
 

@@ -8,21 +8,21 @@ import numpy as np
 
 from ...planner import Box, Pose, Sphere
 from ...planner.robot.kinematics import CHAIN
-from ..core.dense_reward import closeness
+from ..core import spaces as space
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv, gaps
-from ..core.spaces import REACH
+from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
+from ..judge.dense_reward import closeness, gaps
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
 from ..simulation.render import Ghost
 from ..simulation.simulation import Start
 from ..simulation.state import State
+from .facts import REACH
 from .grasps import above, block_grasps, block_poses, check_places
 from .layout import BASE_GAP, LONG_GAP, RANGES, stack_layout
 from .reach_rules import MAX_ANGLE, MAX_OFFSET, ReachProgress
 from .rules import BLOCK_SIZE
-from .skill import REACH_SKILL
 
 OPTIONS = ("level", "obstacles", "object_poses", "joint_positions")
 HEIGHT = 0.08
@@ -30,81 +30,10 @@ HEIGHT = 0.08
 
 
 class ReachEnv(SingleMotionEnv[ReachProgress]):
-    """Bring the open hand above a block, ready to grasp it.
+    """Bring the open hand above a block, ready to grasp it."""
 
-    ## Description
-    A wooden block (60 x 40 x 50 mm) lies on a table. The hand's goal is 8 cm above the block's center, pointing
-    straight down, with the fingers on both sides of its narrow axis; half a turn of the hand makes no difference.
-    Success is judged from the simulator: the hand stays within 10 mm and 10 degrees of its goal for half a second.
-
-    ## Action Space
-    `Box(-1, 1, (7,), float64)` at 20 Hz; `(8,)` with `control_mode="joint_velocity"` for an arm of seven joints.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or objects. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (1, 7) | pose of the block |
-    | `goal_pose` | (1, 7) | goal of the tcp; constant during an episode |
-    | `motion_index` | (1,) | 1 while the hand is at its goal, else 0 |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-    | `last_action` | that of the action | last action; zeros at the start |
-
-    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
-    vector), `achieved_goal` and `desired_goal`
-    (7,): pose and goal of the tcp; `reward="sparse"` is 1 within the tolerances.
-    `compute_reward(achieved, desired, info)` accepts one goal or many. Stable-Baselines3's HER works with it.
-
-    ## Rewards
-    `reward="dense"` (default): in [0, 1], closeness of the hand to its goal, 1 once it has been there for half a
-    second. `reward="sparse"`: 1 with success, else 0.
-
-    ## Starting State
-    By `level`: L0 the nominal place; L1 the block moved by up to 10 cm and turned by up to 30 degrees, start joints by
-    up to 0.05 rad; L2 up to 20 cm, 120 degrees and 0.15 rad. L3, L4 and F are L2 with obstacles on the hand's path, see
-    `onedemo/Stack-v0`. R, S and T start as L1 does.
-
-    ## Episode End
-    `terminated` never: the task can always succeed.
-    `truncated` after 150 actions, 7.5 s at 20 Hz (Gymnasium's `TimeLimit`: give `max_episode_steps` with another
-    `control_frequency`). A settled success ends the episode with
-    `end_on_success=True`, the default of `reward="sparse"`; with dense rewards, which are never negative, an early end
-    would pay less than waiting beside the goal, so there and in the goal form the episode continues.
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m], `layouts_refused`, `position_error`
-    [m], `angle_error` [rad].
-
-    ## Arguments
-    `robot="Panda"` (Baxter and every robot of `onedemo/Stack-v0`), `level="L1"`, `obstacles=None` (those of the
-    level) or `"none" | "static" | "appear" | "moving" | "unforeseen" | "forearm"`, `control_mode="ee_twist" |
-    "joint_velocity"`, `reward="dense" | "sparse"`, `control_frequency=20` (10, 20, 25 or 50: any that divides 500),
-    `goal_form=False`, `end_on_success=None`, `render_mode=None | "rgb_array" | "human"`, `arm=None`.
-    `reset(options=...)` takes `level`, `obstacles`, `object_poses` (1, 7) and `joint_positions` (7,).
-
-    ## Version History
-    * v0: first version.
-    """
-
-    SKILL = REACH_SKILL
-    GOAL_BOUNDS = (REACH, REACH, REACH, 1.0, 1.0, 1.0, 1.0)
+    FACTS = REACH
+    GOAL_BOUNDS = (*(space.REACH,) * 3, 1.0, 1.0, 1.0, 1.0)
 
     def __init__(
         self,

@@ -8,14 +8,17 @@ import numpy as np
 
 from ...planner.geometry import screw
 from ...planner.geometry.pose import Pose
-from ...planner.jit import kernel
-from ..core.dense_reward import closeness
-from ..core.progress import Progress
-from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, WORLD
+from ..judge.dense_reward import closeness
+from ..judge.goal_progress import contacts
+from ..judge.judge import unwanted_contacts
+from ..judge.progress import Progress
+from ..scene.scene import FIRST_OBJECT, WORLD
 from ..simulation.state import State
 
 MAX_OFFSET, MAX_ANGLE = 0.010, float(np.deg2rad(10.0))
 """Tolerances of the hand at its goal [m, rad]."""
+ALLOWED = contacts(1, [(WORLD, FIRST_OBJECT)])
+"""Wanted contacts: only block and table may touch."""
 
 
 class ReachVerdict(NamedTuple):
@@ -24,18 +27,6 @@ class ReachVerdict(NamedTuple):
     unwanted: int
     low: int
     high: int
-
-
-@kernel
-def unwanted_contacts(touching):
-    """Return the number of unwanted contacts and the owners in the last one; only block and table may touch."""
-    count, low, high = 0, -1, -1
-    for a in range(len(touching)):
-        for b in range(a, len(touching)):
-            own = a == b or (a == ARM and b == FINGERS) or (a == OTHER_ARM and b == OTHER_FINGERS)
-            if touching[a, b] != 0.0 and not own and not (a == WORLD and b >= FIRST_OBJECT):
-                count, low, high = count + 1, a, b
-    return count, low, high
 
 
 class ReachProgress(Progress):
@@ -81,7 +72,7 @@ class ReachProgress(Progress):
         self.distance, self.angle = min(
             (screw.pose_distance(here, goal) for goal in self._goals), key=lambda gap: gap[1]
         )
-        verdict = ReachVerdict(*unwanted_contacts(state.touching))
+        verdict = ReachVerdict(*unwanted_contacts(state.touching, ALLOWED, -1))
         self._settle(self._there, verdict)
         return verdict
 

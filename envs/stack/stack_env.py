@@ -12,14 +12,15 @@ from ...planner.robot.kinematics import CHAIN
 from ..core.environment import TaskEnv
 from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
+from ..judge.goal_progress import GoalProgress
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
 from ..simulation.render import Ghost
 from ..simulation.simulation import Start
+from .facts import STACK
 from .grasps import above, block_grasps, block_poses, check_places
 from .layout import BASE_GAP, LONG_GAP, RANGES, stack_layout
-from .rules import BLOCK, BLOCK_SIZE, StackProgress
-from .skill import STACK_SKILL
+from .rules import BLOCK, BLOCK_SIZE, stack_rules
 
 TEXTURES = ("WoodLight", "WoodRed", "WoodGreen", "WoodBlue", "WoodDark", "WoodLight")
 OPTIONS = ("level", "obstacles", "object_poses", "base_pose", "joint_positions")
@@ -31,81 +32,10 @@ PAPER_SPEED = 0.1
 """Peak speed of the obstacle that swings in front of the last block [m/s]."""
 
 
-class StackEnv(TaskEnv[StackProgress]):
-    """Stack wooden blocks at a given place, in order, with one arm.
+class StackEnv(TaskEnv[GoalProgress]):
+    """Stack wooden blocks at a given place, in order, with one arm."""
 
-    ## Description
-    Wooden blocks (60 x 40 x 50 mm, 72 g) lie on a table. Block 0 must be put at the base place, block 1 onto it,
-    and so on. Only friction holds them between the fingers. Success is judged from the simulator: for half a second
-    every block is within 10 mm horizontally, 10 degrees of yaw (a block looks the same after half a turn) and 5 mm
-    in height of its goal, touched by no finger and at rest, and the hand has withdrawn by 5 cm.
-
-    ## Action Space
-    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or blocks. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n, 7) | poses of the blocks |
-    | `goal_pose` | (n, 7) | goal of each block; constant during an episode |
-    | `motion_index` | (1,) | 2k while block k is to be fetched, 2k + 1 while it is held, 2n when all are placed |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-
-    ## Rewards
-    `reward="dense"`: in [0, 1], the completed share of the task, including reaching, grasping and carrying of the
-    current block. `reward="sparse"`: 1 with success, else 0.
-
-    ## Starting State
-    By `level`: L0 the nominal row; L1 blocks moved by up to 10 cm and turned by up to 30 degrees, the base place by
-    up to 5 cm, start joints by up to 0.05 rad; L2 up to 20 cm, 120 degrees, 10 cm and 0.15 rad. Blocks are at least
-    12 cm apart, 17 cm from the base place, and 0.32 to 0.70 m from the arm's base axis, where a Panda's hand can point
-    straight down; blocks and base place keep to a robot's own reach, `ROBOTS[robot].reach`, where it differs.
-
-    L3, L4 and F are L2 with obstacles: L3 has one to three static ones of 3 to 10 cm on the hand's path, L4 one that
-    swings across the path at up to 0.3 m/s or appears during a carry, F a static one where the forearm passes.
-    R, S and T start as L1 does. Obstacles are solid. They overlap the volume that hand and block sweep on the
-    straight path, and leave clearance at the start, at every grasp and at every goal, for any method.
-
-    ## Episode End
-    `terminated` with a settled success, or when a block has fallen off the table. `truncated` after 60 s for three
-    blocks (Gymnasium's `TimeLimit`).
-
-    ## Info
-    `is_success`, `success`, `safe` (no unwanted contact so far), `stage`, `failure_reason`, `collision`,
-    `n_contacts` (steps with an obstacle touched), `min_obstacle_distance` [m] (smallest so far, of the whole arm and
-    the held object), `layouts_refused` (starts that had no space for the obstacles), `blocks_placed`,
-    `position_error` (n,) [m], `yaw_error` (n,) [rad].
-
-    ## Arguments
-    `robot="Panda"`, `n_blocks=3` (1 to 6), `level="L1"`, `obstacles=None` (those of the level) or `"none" |
-    "static" | "appear" | "moving" | "unforeseen" | "forearm" | "paper"`, `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `render_mode=None | "rgb_array" | "human"`,
-    `arm=None` (the robot's default arm; of Baxter's "right" and "left", the other one is parked).
-    `reset(options=...)` takes `level`, `obstacles` (a kind, or a list of `ScheduledObstacle`), `object_poses` (n, 7),
-    `base_pose` (7,) of the lowest block's goal, and `joint_positions` (7,).
-
-    ## Version History
-    * v0: first version.
-    """
-
-    SKILL = STACK_SKILL
+    FACTS = STACK
 
     def __init__(
         self,
@@ -140,7 +70,8 @@ class StackEnv(TaskEnv[StackProgress]):
         )
         self.n_blocks, self._reach = n_blocks, kind.reach
         self._goal_pose = np.zeros((n_blocks, 7))
-        self._progress = StackProgress(self._goal_pose, self._goal_pose, self.control_dt)
+        self._rules = stack_rules(n_blocks)
+        self._progress = GoalProgress(self._rules, self._goal_pose, self._goal_pose, self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
@@ -159,7 +90,7 @@ class StackEnv(TaskEnv[StackProgress]):
             joints = checked_joints(options["joint_positions"], self.arms)
         self._goal_pose = np.repeat(base[None], self.n_blocks, axis=0)
         self._goal_pose[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
-        self._progress = StackProgress(self._goal_pose, poses, self.control_dt)
+        self._progress = GoalProgress(self._rules, self._goal_pose, poses, self.control_dt)
         return Start(joints, poses)
 
     def _placement_motions(self, start: Start) -> list[PlacementMotion]:

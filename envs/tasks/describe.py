@@ -18,14 +18,14 @@ ACROSS = np.array([np.cos(YAWS), np.sin(YAWS), np.zeros(len(YAWS))])
 
 
 def described(task: Task) -> str:
-    """Return the Markdown page of a task: what is there, where it stands by level, and when the task is done."""
+    """Return, in Markdown, what is there in a task, where it stands by level, and when the task is done."""
     things = "| thing | | parts | size [mm] | where x, y [m] | moved at L1 | at L2 |\n|---|---|---|---|---|---|---|\n"
     rows = [("object", each.name, each.body.parts) for each in task.objects]
     rows += [("fixture", each.name, each.furniture.parts) for each in task.fixtures]
     things += "\n".join(_row(kind, name, parts, task.start[name]) for kind, name, parts in rows)
     goals = [f"- {_goal(task, name)}" for name in task.goals]
     done = "\n".join([*goals, *_conditions(task)])
-    parts = [f"# {task.id}", task.summary, things, *_wide(task), "Done when, as the simulator shows it:", done]
+    parts = [things, *_wide(task), "Done when, as the simulator shows it:", done]
     return "\n\n".join(parts)
 
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import gymnasium as gym
 
+from ..core.whole_copies import WHOLE_COPIES
 from ..dotted_names import BadDottedName, imported
 from ..errors import BadTask
-from ..registration import WHOLE_COPIES
-from .task import FREQUENCY, Task
+from .facts import OWN
+from .task import Task
 
 FORM = "my_tasks:MY_TASK"
-ENTRY = "onedemo.envs.tasks.task_env:DeclaredEnv"
 
 
 class Registered(NamedTuple):
@@ -98,9 +99,13 @@ def _registered(task: Task, file: str) -> str:
         whose = f" by {known.file}" if known is not None and known.file else ""
         raise task.bad("name", f"{task.id} is registered already{whose}: choose another name")
     gym.registry.pop(task.id, None)
-    steps = round(task.seconds * FREQUENCY)
+    facts = replace(OWN, seconds=task.seconds)
     gym.register(
-        task.id, ENTRY, max_episode_steps=steps, additional_wrappers=(WHOLE_COPIES,), kwargs={"declared": task}
+        task.id,
+        facts.entry_point,
+        max_episode_steps=facts.steps,
+        additional_wrappers=(WHOLE_COPIES,),
+        kwargs={"declared": task},
     )
     _REGISTERED[task.id] = Registered(task, file)
     return task.id

@@ -2,63 +2,75 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...planner.errors import OneDemoError
-from ..core.dense_reward import placing
-from ..core.progress import Progress
 from ..dotted_names import said
-from ..scene.scene import FINGERS, FIRST_OBJECT
-from ..scene.scene_objects import TABLE_HEIGHT
+from ..judge.dense_reward import placing
+from ..judge.goal_progress import LIFTED, GoalProgress, GoalRules, contacts, goal_row
+from ..judge.judge import GOAL, MEASURE, MEMORY, GoalVerdict, is_met
+from ..scene.scene import ARM, FINGERS, FIRST_OBJECT, OBSTACLE, OTHER_ARM, WORLD
 from ..simulation.state import State
-from .judge import GOAL, TaskVerdict, judge_task
 from .success import SceneView
 from .task import Task
 
-LOWEST = TABLE_HEIGHT - 0.05
-"""Height (z) of an object's frame below which it has fallen off the table [m]."""
-LIFTED = 0.02
-"""Height above its start from which a held object counts as lifted [m]."""
+
+def is_unwanted(low: int, high: int) -> bool:
+    """Return whether two owners should not touch: an obstacle with anything movable, or a link with anything.
+
+    Args:
+        low: smaller owner, see `WORLD` in `scene`.
+        high: larger owner.
+    """
+    if OBSTACLE in (low, high):
+        return low != high and (low == OBSTACLE or low in (ARM, FINGERS, OTHER_ARM))
+    if low == WORLD:
+        return high in (ARM, OTHER_ARM)
+    return low in (ARM, OTHER_ARM) and high >= OBSTACLE
 
 
-def goal_rows(task: Task) -> np.ndarray:
-    """Return the rows (g, `GOAL.width`) that describe a task's goals to the judge."""
-    names, rows = [each.name for each in task.objects], np.zeros((len(task.goals), GOAL.width))
+def task_rules(task: Task) -> GoalRules:
+    """Return the rules of a task as arrays for the judge."""
+    names, count = [each.name for each in task.objects], FIRST_OBJECT + len(task.objects)
+    rows = np.zeros((len(task.goals), GOAL.width))
     for row, name in zip(rows, task.goals, strict=True):
         limits, thing = task.tolerance(name), names.index(name)
-        row[:] = thing, task.objects[thing].body.yaw_symmetry, limits.xy, limits.z, limits.angle
-    return rows
+        symmetry = task.objects[thing].body.yaw_symmetry
+        row[:] = goal_row(thing, symmetry, across=limits.xy, along=limits.z, angle=limits.angle)
+    stays = [task.success.undisturbed.get(name, (math.inf, math.inf)) for name in names]
+    pairs = ((low, high) for low in range(count) for high in range(low, count) if not is_unwanted(low, high))
+    return GoalRules(
+        rows=rows,
+        stays=np.array(stays, dtype=np.float64),
+        allowed=contacts(len(names), pairs),
+        withdrawn=task.success.withdrawn,
+        still=task.success.still,
+        ordered=task.success.in_order,
+        in_turn=False,
+    )
 
 
-class TaskProgress(Progress):
+class TaskProgress(GoalProgress):
     """Progress of an episode.
 
     Args:
         task: the task.
         view: the scene for its predicates, set to the new state before each `update`.
-        rows: see `goal_rows`.
+        rules: see `task_rules`.
         goals: (g, 7) goals, x y z [m] and wxyz.
         start: (n, 7) poses of the objects at the start.
         dt: time between states [s].
     """
 
-    def __init__(self, task: Task, view: SceneView, rows: np.ndarray, goals: np.ndarray, start: np.ndarray, dt: float):
-        super().__init__(dt)
+    def __init__(self, task: Task, view: SceneView, rules: GoalRules, goals: np.ndarray, start: np.ndarray, dt: float):
+        super().__init__(rules, goals, start, dt)
         self._needed = max(1, round(task.success.seconds / dt))
-        self.view, self._task, self._goals, self._heights = view, task, goals, start[:, 2].copy()
-        self._rows, self._errors = rows, np.zeros((3, len(goals)))
-        self._limits = np.array([task.success.still, task.success.withdrawn])
-        self._names = [each.name for each in task.objects]
-        self.placed, self.held = 0, False
-        self._stage, self._best, self._failure, self._over = "start", 0, "", False
-
-    @property
-    def motion_index(self) -> float:
-        """2k while k objects are in place, 2k + 1 while another one is in the hand."""
-        return float(2 * self.placed + self.held)
+        self.view, self._task = view, task
+        self._stage, self._over = "start", False
 
     @property
     def failed(self) -> bool:
@@ -70,27 +82,18 @@ class TaskProgress(Progress):
         """Furthest progress in words."""
         return "success" if self.success else self._stage
 
-    @property
-    def failure(self) -> str:
-        """Reason why the task cannot succeed any more, "" if it can."""
-        return self._failure
-
-    def update(self, state: State) -> TaskVerdict:
+    def update(self, state: State) -> GoalVerdict:
         """See `Progress`."""
-        self._errors = np.empty((3, len(self._goals)))
-        poses, moving, tcp = state.object_pose, state.object_velocity, state.tcp_pose
-        verdict = TaskVerdict(
-            *judge_task(poses, moving, tcp, state.touching, self._goals, self._rows, LOWEST, self._limits, self._errors)
-        )
-        self.placed, self.held = verdict.placed, verdict.held == 1
+        verdict = self._verdict(state)
         also = self._task.success.also
-        done = verdict.placed == len(self._goals) and verdict.quiet == 1
+        done = verdict.placed == len(self.goals) and verdict.quiet == 1
         # asked at every state: it may remember what it has seen
         agreed = also is None or self._holds("also", also)
         self._settle(done and agreed, verdict)
         self._note_stage(state)
-        if verdict.fallen:
-            self._fail("off_table")
+        for reason, broken in (("off_table", verdict.fallen), ("constraint", verdict.disturbed)):
+            if broken:
+                self._fail(reason)
         for reason, predicate in self._task.success.failed:
             if self._holds(reason, predicate):
                 self._fail(reason)
@@ -117,29 +120,30 @@ class TaskProgress(Progress):
 
     def _note_stage(self, state: State) -> None:
         if self.placed > self._best:
-            self._best, self._stage = self.placed, f"placed {self.placed} of {len(self._goals)}"
+            self._best, self._stage = self.placed, f"placed {self.placed} of {len(self.goals)}"
         held = state.touching[FINGERS, FIRST_OBJECT:] != 0.0
-        for k in np.flatnonzero(held & (state.object_pose[:, 2] > self._heights + LIFTED)):
+        for k in np.flatnonzero(held & (state.object_pose[:, 2] > self.memory[MEMORY.height] + LIFTED)):
             if not self._best:
-                self._stage = f"lifted {self._names[k]}"
+                self._stage = f"lifted {self._task.objects[k].name}"
 
     def reward(self, state: State) -> float:
         """See `Progress`: the mean over the goals, see `dense_reward.placing`; without goals, that of success."""
-        if not len(self._goals):
+        if not len(self.goals):
             return float(self.success)
         rewards, tcp = [], state.tcp_pose[0, :3]
-        for row, (across, along, angle) in zip(self._rows, self._errors.T, strict=True):
-            thing = int(row[GOAL.thing])
+        for row, errors in zip(self.rules.rows, self.errors, strict=True):
+            thing, far = int(row[GOAL.thing]), float(np.hypot(errors[MEASURE.across], errors[MEASURE.along]))
             reach = float(np.linalg.norm(state.object_pose[thing, :3] - tcp))
             held = bool(state.touching[FINGERS, FIRST_OBJECT + thing])
-            done = bool(across <= row[GOAL.xy] and along <= row[GOAL.z] and angle <= row[GOAL.angle] and not held)
-            away = min(1.0, reach / max(self._limits[1], 1e-6))
-            rewards.append(float(placing(reach, float(np.hypot(across, along)), float(angle), held, done, away)))
+            done = bool(is_met(errors, row) and not held)
+            away = min(1.0, reach / max(self.rules.withdrawn, 1e-6))
+            rewards.append(float(placing(reach, far, float(errors[MEASURE.angle]), held, done, away)))
         return float(np.mean(rewards))
 
     def task_info(self) -> dict[str, Any]:
         """See `Progress`."""
         wanted = self._task.success.numbers
         numbers = {name: float(self._asked(name, function)) for name, function in wanted.items()}
-        position = np.hypot(self._errors[0], self._errors[1])
-        return {"placed": self.placed, "position_error": position, "angle_error": self._errors[2].copy(), **numbers}
+        position = np.hypot(self.errors[:, MEASURE.across], self.errors[:, MEASURE.along])
+        angle = self.errors[:, MEASURE.angle].copy()
+        return {"placed": self.placed, "position_error": position, "angle_error": angle, **numbers}

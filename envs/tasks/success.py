@@ -127,6 +127,8 @@ class Success:
         withdrawn: least distance [m] of the tcp from the frame of every object with a goal.
         still: largest speed [m/s] of an object at rest.
         seconds: time [s] for which all this must hold.
+        in_order: whether objects only count as in place once those before them, in the order of the goals, are.
+        undisturbed: objects that must stay where they are, with how far they may be moved: distance [m] and turn [rad].
         also: further condition; None: none. Without goals it is the only one.
         failed: reasons, each with the condition under which the task cannot succeed any more.
         numbers: numbers for `info` and reports, by name.
@@ -136,6 +138,8 @@ class Success:
     withdrawn: float = 0.05
     still: float = 0.01
     seconds: float = 0.5
+    in_order: bool = False
+    undisturbed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     also: Predicate | None = None
     failed: tuple[tuple[str, Predicate], ...] = ()
     numbers: Mapping[str, Callable[[SceneView], float]] = field(default_factory=dict)

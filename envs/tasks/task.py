@@ -138,6 +138,10 @@ class Task:
         self._check_known("goals", self.goals, objects)
         self._check_known("grasps", self.grasps, objects)
         self._check_known("passes", self.passes, [name for name in objects if name in self.goals])
+        self._check_known("success.undisturbed", self.success.undisturbed, objects)
+        for name, most in self.success.undisturbed.items():
+            if np.shape(most) != (2,) or not all(isinstance(each, int | float) and each >= 0.0 for each in most):
+                raise self.bad("success.undisturbed", f"of {name!r} is {most!r}; expected (distance in m, turn in rad)")
         self._check_known("success.tolerances", self.success.tolerances, objects)
         for name in self.success.tolerances:
             if name not in self.goals:

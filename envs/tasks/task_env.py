@@ -12,13 +12,14 @@ from ...planner.errors import BadOption
 from ...planner.robot.kinematics import CHAIN
 from ..core import spaces as space
 from ..core.carries import carry_motion, corners_at, grasp_from_above, reach_motion
-from ..core.dense_reward import closeness
 from ..core.description import TaskDescription
 from ..core.environment import Observation
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
 from ..core.single_motion import Agreement, SingleMotionEnv
 from ..errors import BadTask
+from ..judge.dense_reward import closeness
+from ..judge.judge import GOAL, MEASURE, is_met, measure
 from ..scene.robots import robot_named
 from ..scene.scene import FINGERS, FIRST_OBJECT
 from ..scene.scene_objects import SceneSpec
@@ -26,10 +27,10 @@ from ..simulation.render import Ghost
 from ..simulation.simulation import Start
 from ..simulation.state import State
 from .arrangement import Arrangement
-from .judge import GOAL, angle_between, offsets
+from .facts import own_facts
 from .layout import JOINTS, TaskLayout, TaskLayouts
 from .places import Range
-from .rules import TaskProgress, goal_rows
+from .rules import TaskProgress, task_rules
 from .success import SceneView
 from .task import FREQUENCY, Task
 
@@ -37,73 +38,7 @@ OPTIONS = ("level", "obstacles", "object_poses", "joint_positions")
 
 
 class DeclaredEnv(SingleMotionEnv[TaskProgress]):
-    """A user's own task, declared as data.
-
-    ## Description
-    See the task's own summary. Success is judged from the simulator: for `Success.seconds` every object with a goal is
-    within its tolerance, touched by no finger and at rest, the hand has withdrawn, and the task's own condition holds.
-
-    ## Action Space
-    `Box(-1, 1, (8,), float64)` for an arm of seven joints, at 50 Hz; `(7,)` with `control_mode="ee_twist"`.
-
-    | control mode | entry | meaning |
-    |---|---|---|
-    | `joint_velocity` | 0 to 6 | joint speed as a fraction of the joint's limit |
-    | `ee_twist` | 0 to 2 | velocity of the tcp in world axes as a fraction of 0.25 m/s |
-    | `ee_twist` | 3 to 5 | angular velocity of the tcp in world axes as a fraction of 1.2 rad/s |
-    | both | last | gripper: above 0 closes it, below 0 opens it to that fraction of its width, 0 leaves it unchanged |
-
-    ## Observation Space
-    A `Dict` of float64 boxes; the first axis counts arms or things. Poses are `x y z [m]`, then quaternion wxyz.
-
-    | key | shape | meaning |
-    |---|---|---|
-    | `joint_positions` | (1, 7) | [rad] |
-    | `joint_velocities` | (1, 7) | [rad/s] |
-    | `tcp_pose` | (1, 7) | point between the finger pads; fingers close along its x, the hand points along its z |
-    | `gripper_opening` | (1,) | gap between the finger pads [m] |
-    | `object_pose` | (n, 7) | poses of the objects |
-    | `goal_pose` | (g, 7) | goals, in the order of the task; constant during an episode |
-    | `motion_index` | (1,) | 2k while k objects are in place, 2k + 1 while the fingers touch an object |
-    | `furniture_pose` | (m, 7) | poses of the fixtures; only where there are any |
-    | `obstacle_active` | (3,) | 1 for a present obstacle; all entries of absent ones are 0 |
-    | `obstacle_shape` | (3,) | 1 sphere, 2 box, 3 capsule |
-    | `obstacle_size` | (3, 3) | box: extents; capsule: radius, radius, length of its segment; sphere: radius |
-    | `obstacle_pose` | (3, 7) | poses of the obstacles |
-    | `obstacle_velocity` | (3, 3) | velocities of their centers [m/s] |
-    | `last_action` | that of the action | last action; zeros at the start |
-
-    With `goal_form=True` the keys are `observation` (all of the above except `goal_pose` and `motion_index`, as one
-    vector), `achieved_goal` and `desired_goal` (8 g,): pose of each object with a goal, and 1 where it is released,
-    else 0; its goal and 1. A task without goals has no goal form.
-
-    ## Rewards
-    `reward="sparse"` (default): 1 with success, else 0. `reward="dense"`: in [0, 1], mean over the goals: up to 0.75
-    for bringing the object there, from 0.75 to 1 for withdrawing; without goals it is that of success.
-
-    ## Starting State
-    By `level`: L0 the nominal layout; L1 and L2 things and goals moved as the task's ranges say. L3, L4 and F are L2
-    with obstacles on the way of the objects, see `onedemo/Stack-v0`. R, S and T start as L1 does.
-
-    ## Episode End
-    `terminated` with a settled success (with sparse rewards, or `end_on_success=True`), when an object has fallen off
-    the table, or when one of the task's conditions of failure holds. `truncated` after the task's time limit.
-
-    ## Info
-    `is_success`, `success`, `safe` (so far an obstacle was touched by neither robot nor object, and nothing else by a
-    link of the arm), `stage`, `failure_reason`, `collision`, `n_contacts`, `min_obstacle_distance` [m],
-    `layouts_refused`, `placed`, `position_error` (g,) [m], `angle_error` (g,) [rad], and the task's own numbers.
-
-    ## Arguments
-    `robot="Panda"` (any, with one arm at work), `level="L1"`, `obstacles=None` (those of the level) or `"none" |
-    "static" | "appear" | "moving" | "unforeseen" | "forearm"`, `control_mode="joint_velocity" | "ee_twist"`,
-    `reward="sparse" | "dense"`, `control_frequency=50`, `goal_form=False`, `end_on_success=None`,
-    `render_mode=None | "rgb_array" | "human"`, `arm=None`. `reset(options=...)` takes `level`, `obstacles`,
-    `object_poses` (n, 7) and `joint_positions` (7,).
-
-    ## Version History
-    * v0: first version.
-    """
+    """A user's own task, declared as data."""
 
     def __init__(
         self,
@@ -121,7 +56,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
     ):
         if not isinstance(declared, Task):
             raise BadTask(declared, "", f"is a {type(declared).__name__}, not a Task")
-        self.declared, kind = declared, robot_named(robot)
+        self.declared, self.FACTS, kind = declared, own_facts(declared), robot_named(robot)
         fixtures = tuple(each.furniture for each in declared.fixtures)
         if goal_form and not declared.goals:
             raise BadOption("goal_form", f"{declared.name} has no goals: success is only a condition")
@@ -142,7 +77,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
         )
         axis = self.arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
         self._arrangement = Arrangement(TaskLayouts(declared, robot, axis, kind.reach), self.sim)
-        self._rows = goal_rows(declared)
+        self._rules = task_rules(declared)
         self.GOAL_BOUNDS = (*(space.REACH,) * 3, *(1.0,) * 5) * len(declared.goals)
         self._take_form(declared.name, goal_form, end_on_success)
         layout = self._arrangement.nominal
@@ -158,7 +93,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
         fixtures = {name: Pose.from_vector(row) for name, row in zip(fixed, layout.fixtures, strict=True)}
         goals = {name: Pose.from_vector(row) for name, row in zip(self.declared.goals, layout.goals, strict=True)}
         view = SceneView(names, fixtures, goals)
-        return TaskProgress(self.declared, view, self._rows, layout.goals, layout.objects, self.control_dt)
+        return TaskProgress(self.declared, view, self._rules, layout.goals, layout.objects, self.control_dt)
 
     def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
         check_known(options, OPTIONS)
@@ -191,7 +126,7 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
 
     def _thing(self, goal: int) -> int:
         """Return the index of a goal's object."""
-        return int(self._rows[goal, GOAL.thing])
+        return int(self._rules.rows[goal, GOAL.thing])
 
     def _ghosts(self) -> list[Ghost]:
         """Return the goals that are ranges on the table; at another thing, that thing is seen."""
@@ -228,12 +163,12 @@ class DeclaredEnv(SingleMotionEnv[TaskProgress]):
     def _agreement(self, are: np.ndarray, wanted: np.ndarray) -> tuple[float, float]:
         """Return closeness and whether all goals (g, 8) are reached."""
         near, reached = [], True
-        for row, one, goal in zip(self._rows, are, wanted, strict=True):
-            across, along = offsets(one, goal)
-            angle = angle_between(one, goal, row[GOAL.yaw_symmetry])
-            there = across <= row[GOAL.xy] and along <= row[GOAL.z] and angle <= row[GOAL.angle]
-            reached = reached and there and one[7] >= goal[7]
-            near.append(closeness(float(np.hypot(across, along)), angle))
+        for row, one, goal in zip(self._rules.rows, are, wanted, strict=True):
+            errors = np.zeros(MEASURE.width)
+            measure(one[:7], goal[:7], row[GOAL.yaw_symmetry], errors)
+            reached = reached and is_met(errors, row) and one[7] >= goal[7]
+            far = float(np.hypot(errors[MEASURE.across], errors[MEASURE.along]))
+            near.append(closeness(far, errors[MEASURE.angle]))
         return float(np.mean(near)), float(reached)
 
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:

@@ -12,9 +12,9 @@ import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
-from onedemo.bench.task_table import TASKS
 from onedemo.configs.grid import load_config, load_grid
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
+from onedemo.envs import TASKS
 from onedemo.envs.scene.robots import ROBOTS
 from onedemo.planner.errors import BadOption
 from onedemo.planner.imitation.demonstration_files import read_demonstration

@@ -14,10 +14,10 @@ from onedemo.baselines.key_poses import DENSE
 from onedemo.baselines.motion.tool_frame import ToolFrameMotion
 from onedemo.bench.geometric.metrics import curve_gap
 from onedemo.bench.run.episode_jobs import policy_for
-from onedemo.bench.task_table import TASKS
 from onedemo.configs.grid import load_grid
 from onedemo.configs.run_config import FAMILIES, RunConfig
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
+from onedemo.envs import TASKS
 from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.segmentation import key_poses, resampled
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from onedemo.bench.task_pages import page_text, summary_of
-from onedemo.bench.task_table import TASKS
-from onedemo.envs import IDS
+from onedemo.bench.task_pages import page_text
+from onedemo.envs import IDS, TASKS
 
 PAGES = Path(__file__).parents[2] / "docs" / "tasks"
 SECTIONS = ("Description", "Action Space", "Observation Space", "Rewards", "Starting State", "Episode End", "Info",
@@ -22,7 +21,7 @@ def test_a_page_is_its_docstring_and_has_all_sections_and_a_clip(task):
     for section in SECTIONS:
         assert f"\n## {section}\n" in page, section
     assert (PAGES / f"{task}.webp").stat().st_size > 10_000
-    assert summary_of(TASKS[task].id) in page
+    assert TASKS[task].page.summary in page
 
 
 def test_every_environment_has_a_page():

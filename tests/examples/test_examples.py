@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import onedemo
+from onedemo.baselines import task_episode
 from onedemo.baselines.recording.recorders import recorder_of
 from onedemo.envs import task_at
 
@@ -82,6 +83,17 @@ def test_the_demonstration_is_what_the_script_records(name):
     again, kept = recorder_of(path).record(env.unwrapped), onedemo.load_demonstration(f"{name}.npz")
     assert len(again.path) == len(kept.path) and again.source == kept.source == "scripted"
     assert np.abs(again.joint_positions - kept.joint_positions).max() < 1e-3
+    env.close()
+
+
+@pytest.mark.parametrize("mode", ["joint_velocity", "ee_twist"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_demonstration_is_an_episode_for_learners(name, mode):
+    task = task_at(f"{name}:{EXAMPLES[name]}")
+    env = gym.make(task.id, control_mode=mode, control_frequency=20)
+    episode = task_episode(env, onedemo.load_demonstration(task.demonstration))
+    assert episode.success and episode.rewards[-1] == 1.0 and len(episode.actions) < 300
+    assert all(env.action_space.contains(action) for action in episode.actions)
     env.close()
 
 

@@ -14,7 +14,8 @@ from onedemo.configs.shipped_files import shipped_demonstration
 from onedemo.envs import ROBOTS
 from onedemo.envs.core.description import TaskFurniture
 from onedemo.envs.pour import layout as pour_layouts
-from onedemo.envs.pour.geometry import BACK, GLASSES, STANDS, TARGET, TILTED, UP, grasp, pouring
+from onedemo.envs.pour.facts import TARGET
+from onedemo.envs.pour.geometry import BACK, GLASSES, STANDS, TILTED, UP, grasp, pouring
 from onedemo.envs.pour.places import PourPlaces
 from onedemo.envs.scene.robot_description import robot_parts
 from onedemo.envs.scene.scene import compiled_scene

@@ -18,7 +18,8 @@ from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
-from onedemo.envs.pour.geometry import GLASSES, SOURCE, level_hand, tcp_from_glass
+from onedemo.envs.pour.facts import SOURCE
+from onedemo.envs.pour.geometry import GLASSES, level_hand, tcp_from_glass
 from onedemo.planner import Planner, ReactivePlanner
 from onedemo.planner.errors import BadDemonstration, PlanFailed
 from onedemo.planner.geometry.pose import Pose

@@ -9,11 +9,12 @@ import pytest
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
 from onedemo.baselines.programs.skill_program import PATIENCE, SkillProgram
-from onedemo.baselines.recording.record_shelve import SCENE, record_shelve
+from onedemo.baselines.recording.record_shelve import record_shelve
 from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.configs.grid import load_config
 from onedemo.configs.shipped_files import shipped_config, shipped_demonstration
+from onedemo.envs import TASKS
 from onedemo.planner.errors import PlanFailed
 from onedemo.planner.imitation.demonstration_files import read_demonstration
 
@@ -30,7 +31,7 @@ def shelved(seed, level, **arguments):
 
 
 def test_the_shipped_demonstration_replays_to_success_in_the_lower_shelf():
-    env = gym.make("onedemo/Shelve-v0", **SCENE).unwrapped
+    env = gym.make("onedemo/Shelve-v0", **TASKS["shelve"].recorded_in).unwrapped
     env.reset(seed=0, options={"level": "L0"})
     steps = np.diff(SHOWN.joint_positions, axis=0) / env.control_dt / env.arms[0].velocity_limits
     succeeded = False
@@ -43,7 +44,7 @@ def test_the_shipped_demonstration_replays_to_success_in_the_lower_shelf():
 
 @pytest.mark.slow
 def test_the_script_gives_the_shipped_demonstration():
-    env = gym.make("onedemo/Shelve-v0", **SCENE).unwrapped
+    env = gym.make("onedemo/Shelve-v0", **TASKS["shelve"].recorded_in).unwrapped
     again = record_shelve(env)
     np.testing.assert_allclose(again.joint_positions, SHOWN.joint_positions, atol=1e-3)
     assert [each.name for each in again.segments] == [each.name for each in SHOWN.segments]

@@ -27,9 +27,9 @@ from onedemo.bench.metrics.metric_table import METRICS
 from onedemo.bench.metrics.metrics import first_motion, metrics_of
 from onedemo.bench.metrics.smoothness import log_dimensionless_jerk, sparc
 from onedemo.bench.metrics.trace import Trace, TraceRecorder
-from onedemo.bench.task_table import TASKS
 from onedemo.configs.grid import RunConfig
 from onedemo.configs.shipped_files import shipped_demonstration
+from onedemo.envs import TASKS
 from onedemo.envs.simulation.moving_obstacles import ScheduledObstacle
 from onedemo.planner.geometry.pose import Pose
 from onedemo.planner.geometry.shapes import Box, Capsule, Sphere

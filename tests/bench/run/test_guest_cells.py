@@ -21,11 +21,11 @@ from onedemo.bench.report.report import write_report
 from onedemo.bench.run.command import run_config
 from onedemo.bench.run.config_checks import check_grid
 from onedemo.bench.run.episode_jobs import made, policy_for
-from onedemo.bench.task_table import TASKS
 from onedemo.configs.errors import BadConfig
 from onedemo.configs.grid import load_grid
 from onedemo.configs.run_config import FAMILIES, RunConfig
 from onedemo.configs.shipped_files import shipped_config
+from onedemo.envs import TASKS
 from onedemo.planner.errors import BadDemonstration, OneDemoError
 
 LIFT = "name: lift\ntask: robosuite\ndemonstration: lift\nseed: 4000\nvideo: false\nepisodes: 1\n"

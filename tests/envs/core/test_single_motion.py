@@ -14,8 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.envs.core.dense_reward import closeness, placing, tilting
-from onedemo.envs.core.single_motion import gaps, turned_by
+from onedemo.envs.judge.dense_reward import closeness, gaps, placing, tilting, turned_by
 from onedemo.envs.stack.place_one_env import PlaceProgress
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.geometry.pose import Pose

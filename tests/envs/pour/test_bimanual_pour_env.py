@@ -5,9 +5,10 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 import pytest
+from helpers.envs.contacts import wanted
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.envs.pour.rules import allowed_contact, tilt_of
+from onedemo.envs.pour.rules import pour_contacts, tilt_of
 from onedemo.envs.scene.scene import ARM, FINGERS, FIRST_OBJECT, OTHER_ARM, OTHER_FINGERS, WORLD
 from onedemo.planner.errors import BadOption, UnknownName
 
@@ -56,12 +57,12 @@ def test_a_hand_that_opens_drops_its_glass_and_the_episode_ends(env):
 
 
 def test_wanted_contacts():
-    assert allowed_contact(FINGERS, SOURCE, False)
-    assert allowed_contact(OTHER_FINGERS, TARGET, False)
-    assert allowed_contact(OTHER_ARM, OTHER_FINGERS, False)
+    assert wanted(pour_contacts(), FINGERS, SOURCE)
+    assert wanted(pour_contacts(), OTHER_FINGERS, TARGET)
+    assert wanted(pour_contacts(), OTHER_ARM, OTHER_FINGERS)
     unwanted = ((FINGERS, TARGET), (OTHER_FINGERS, SOURCE), (ARM, OTHER_ARM), (ARM, TARGET), (WORLD, OTHER_ARM))
     for pair in (*unwanted, (SOURCE, TARGET), (FINGERS, OTHER_FINGERS)):
-        assert not allowed_contact(*pair, False), pair
+        assert not wanted(pour_contacts(), *pair), pair
 
 
 def test_starts_differ_within_their_level_and_repeat(env):

@@ -8,12 +8,14 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
+from helpers.envs import contacts
 
 import onedemo.envs  # noqa: F401  (registers the ids)
-from onedemo.envs.pour.geometry import BEADS, GLASSES, SOURCE, TARGET, TILTED, grasp, pouring, tcp_from_glass
+from onedemo.envs.pour.facts import SOURCE, TARGET
+from onedemo.envs.pour.geometry import BEADS, GLASSES, TILTED, grasp, pouring, tcp_from_glass
 from onedemo.envs.pour.layout import FARTHEST, GAP, NEAREST, RANGES, pour_layout
 from onedemo.envs.pour.places import POUR_PLACES, PourPlaces
-from onedemo.envs.pour.rules import PourProgress, allowed_contact, beads_inside
+from onedemo.envs.pour.rules import PourProgress, beads_inside, pour_contacts
 from onedemo.envs.scene.beads import poured_into, settled_beads, settling
 from onedemo.envs.scene.scene import (
     ARM,
@@ -146,14 +148,23 @@ def test_a_source_that_was_lifted_and_has_toppled_was_dropped():
 
 def test_wanted_contacts_are_listed_and_all_others_are_not():
     source, target = FIRST_OBJECT + SOURCE, FIRST_OBJECT + TARGET
+    allowed = pour_contacts()
+    allowed[FURNITURE, source] = 1.0
     wanted = {(ARM, FINGERS), (FINGERS, source), (FURNITURE, source), (FURNITURE, target)}
     wanted |= {(OTHER_ARM, OTHER_FINGERS), (OTHER_FINGERS, target)}
     for low in range(OWNERS):
         for high in range(low, OWNERS):
             expected = low == high or BEAD in (low, high) or (low, high) in wanted
-            assert allowed_contact(low, high, True) == expected, (low, high)
-    assert not allowed_contact(FURNITURE, source, False)
-    assert not allowed_contact(WORLD, source, True) and not allowed_contact(OBSTACLE, source, True)
+            assert contacts.wanted(allowed, low, high) == expected, (low, high)
+    assert not contacts.wanted(pour_contacts(), FURNITURE, source)
+    assert not contacts.wanted(allowed, WORLD, source) and not contacts.wanted(allowed, OBSTACLE, source)
+    touching = np.zeros((OWNERS, OWNERS))
+    touching[FURNITURE, source] = 1.0
+    for shift, unwanted in ((0.0, 0), (0.05, 0), (0.07, 1)):
+        assert (
+            progress().update(state(0, 30, poses=moved((shift, 0.0, 0.0)))._replace(touching=touching)).unwanted
+            == unwanted
+        )
 
 
 def test_the_dense_reward_grows_with_what_is_done():

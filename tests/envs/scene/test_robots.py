@@ -6,6 +6,7 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
+from helpers.envs.contacts import wanted
 from helpers.reach import PourReach, ShelfReach
 
 import onedemo.envs  # noqa: F401  (registers the ids)
@@ -21,7 +22,7 @@ from onedemo.envs.shelve.places import SHELF_PLACES
 from onedemo.envs.simulation.simulation import Simulation, Start
 from onedemo.envs.stack.grasps import DOWN
 from onedemo.envs.stack.layout import BASE_PLACE, RANGES
-from onedemo.envs.stack.rules import BLOCK_SIZE, allowed_contact
+from onedemo.envs.stack.rules import BLOCK_SIZE, stack_rules
 from onedemo.planner.collision.capsule_placement import place_capsules
 from onedemo.planner.collision.robot_arrays import ROW, robot_arrays
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
@@ -200,8 +201,8 @@ def test_the_other_arm_is_parked_and_known(side):
 
 def test_an_arm_may_not_touch_trunk_nor_other_arm():
     for pair in ((ARM, OTHER_ARM), (FINGERS, OTHER_ARM), (WORLD, ARM), (WORLD, OTHER_ARM), (ARM, OTHER_FINGERS)):
-        assert not allowed_contact(*pair, 0), pair
-    assert allowed_contact(OTHER_ARM, OTHER_FINGERS, 0)
+        assert not wanted(stack_rules(1).allowed, *pair, 0), pair
+    assert wanted(stack_rules(1).allowed, OTHER_ARM, OTHER_FINGERS, 0)
     scene = compiled_scene(ROBOTS["Baxter"])
     torso = [geom for geom, label in enumerate(scene.labels) if label == "torso"]
     assert len(torso) > 6

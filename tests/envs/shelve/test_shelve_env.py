@@ -5,15 +5,18 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 import pytest
+from helpers.envs import contacts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import onedemo.envs  # noqa: F401  (registers the ids)
+from onedemo.envs.judge.goal_progress import GoalProgress
 from onedemo.envs.scene.scene import ARM, FINGERS, FIRST_OBJECT, FURNITURE, OBSTACLE, WORLD
+from onedemo.envs.shelve import parts
 from onedemo.envs.shelve.layout import RANGES, shelf_layout
 from onedemo.envs.shelve.parts import BOOK_SIZE, CLEAR, PITCH, SHELVES, handed
 from onedemo.envs.shelve.places import SHELF_PLACES, ShelfPlaces
-from onedemo.envs.shelve.rules import ShelveProgress, allowed_contact
+from onedemo.envs.shelve.rules import hand_over, shelve_rules
 from onedemo.envs.shelve.shelve_env import GRASP
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics
 from onedemo.planner.errors import BadOption, OneDemoError
@@ -105,7 +108,7 @@ def test_the_wrong_shelf_does_not_count(env):
 def test_a_clutter_book_pushed_over_is_no_success(env, change, over):
     env.reset(seed=0)
     state = env.sim.read()
-    progress = ShelveProgress(env._goal_pose, state.object_pose, env.control_dt)
+    progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
     poses = state.object_pose.copy()
     poses[:N] = env._goal_pose
     half = 0.5 * np.deg2rad(change[1])
@@ -115,7 +118,7 @@ def test_a_clutter_book_pushed_over_is_no_success(env, change, over):
     poses[4] = fallen.vector
     for _ in range(30):
         verdict = progress.update(state._replace(object_pose=poses, touching=np.zeros_like(state.touching)))
-    assert (verdict.toppled == 1, progress.success) == (over, not over)
+    assert (verdict.disturbed == 1, progress.success) == (over, not over)
     assert progress.failure == ("constraint" if over else "")
 
 
@@ -127,7 +130,7 @@ def test_a_book_in_the_hand_or_moving_or_beside_the_hand_does_not_count(env):
     quiet = state._replace(object_pose=poses, touching=np.zeros_like(state.touching))
 
     def succeeds(**changes):
-        progress = ShelveProgress(env._goal_pose, state.object_pose, env.control_dt)
+        progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
         for _ in range(30):
             progress.update(quiet._replace(**changes))
         return progress.success
@@ -145,7 +148,7 @@ def test_a_book_in_the_hand_or_moving_or_beside_the_hand_does_not_count(env):
 def test_a_lifted_book_that_rests_elsewhere_was_dropped(env):
     env.reset(seed=0)
     state = env.sim.read()
-    progress = ShelveProgress(env._goal_pose, state.object_pose, env.control_dt)
+    progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
 
     def failure(height, gripped):
         poses, touching = state.object_pose.copy(), np.zeros_like(state.touching)
@@ -162,7 +165,11 @@ def test_a_lifted_book_that_rests_elsewhere_was_dropped(env):
 
 def test_wanted_contacts():
     def wanted(low, high, placed=1, handed=2):
-        return allowed_contact(low, high, placed, handed, N)
+        start = np.tile([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], (N + len(parts.CLUTTER), 1))
+        progress = GoalProgress(shelve_rules(N), start[:N], start, 0.02)
+        for k in range(1, handed):
+            hand_over(progress, k, start[k])
+        return contacts.wanted(progress.allowed, low, high, placed)
 
     book = FIRST_OBJECT
     for pair in ((FURNITURE, book), (FURNITURE, CLUTTER), (WORLD, book + 2), (CLUTTER, CLUTTER + 1)):

@@ -8,16 +8,18 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
+from helpers.envs.contacts import wanted
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import onedemo.envs  # noqa: F401  (registers the ids)
+from onedemo.envs.judge.goal_progress import GoalProgress
 from onedemo.envs.scene.robots import ROBOTS
 from onedemo.envs.scene.scene import ARM, FINGERS, FIRST_OBJECT, WORLD
 from onedemo.envs.simulation.state import read_arms, read_objects
 from onedemo.envs.stack.layout import BASE_GAP, BLOCK_GAP, RANGES, fits, nominal_blocks, stack_layout
-from onedemo.envs.stack.rules import BLOCK_SIZE, StackProgress, allowed_contact
+from onedemo.envs.stack.rules import BLOCK_SIZE, stack_rules
 from onedemo.planner.errors import BadOption, OneDemoError
 from onedemo.planner.geometry.pose import Pose
 
@@ -167,17 +169,20 @@ def test_the_nominal_level_is_one_layout(env):
         np.testing.assert_array_equal(starts[0][key], starts[1][key])
 
 
+ALLOWED = stack_rules(3).allowed
+
+
 def test_wanted_contacts():
     block, placed = FIRST_OBJECT, 0
-    assert allowed_contact(WORLD, block, placed)
-    assert allowed_contact(FINGERS, block, placed)
-    assert allowed_contact(FINGERS, block, placed + 1), "let go last"
-    assert allowed_contact(block, block + 1, placed)
+    assert wanted(ALLOWED, WORLD, block, placed)
+    assert wanted(ALLOWED, FINGERS, block, placed)
+    assert wanted(ALLOWED, FINGERS, block, placed + 1), "let go last"
+    assert wanted(ALLOWED, block, block + 1, placed)
     for own in ((ARM, ARM), (ARM, FINGERS), (FINGERS, FINGERS), (WORLD, WORLD), (block, block)):
-        assert allowed_contact(*own, placed), own
+        assert wanted(ALLOWED, *own, placed), own
     for pair in ((FINGERS, block + 1), (ARM, block), (WORLD, ARM), (WORLD, FINGERS), (block, block + 2)):
-        assert not allowed_contact(*pair, placed), pair
-    assert not allowed_contact(FINGERS, block, placed + 2)
+        assert not wanted(ALLOWED, *pair, placed), pair
+    assert not wanted(ALLOWED, FINGERS, block, placed + 2)
 
 
 def test_every_unwanted_pair_counts_and_the_last_one_is_named(env):
@@ -195,7 +200,7 @@ def test_every_unwanted_pair_counts_and_the_last_one_is_named(env):
 def test_a_lifted_block_that_stands_elsewhere_was_dropped_and_one_in_the_hand_was_not(env):
     env.reset(seed=0)
     state = env.sim.read()
-    progress = StackProgress(env._goal_pose, state.object_pose, env.control_dt)
+    progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
 
     def failure(height, gripped, speed=0.0):
         poses, touching = state.object_pose.copy(), np.zeros_like(state.touching)

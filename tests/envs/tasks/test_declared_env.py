@@ -14,9 +14,10 @@ from gymnasium.utils.env_checker import check_env
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs import At, Fixture, Movable, Range, Success, Task, Tolerance, register_task
+from onedemo.envs.judge.judge import angle_between, offsets
 from onedemo.envs.scene.body_clearance import point_clearance
 from onedemo.envs.scene.scene import ARM, FINGERS, FIRST_OBJECT, FURNITURE, OBSTACLE, WORLD
-from onedemo.envs.tasks.judge import angle_between, is_unwanted, offsets
+from onedemo.envs.tasks.rules import is_unwanted
 from onedemo.planner import Box, Cylinder, Obstacle, Pose
 from onedemo.planner.geometry.hulls import corner_points
 from onedemo.planner.geometry.shapes import pack
@@ -160,6 +161,23 @@ def test_success_is_what_the_data_say(env):
     assert put(env, [*ON_PAD[:3], *turned], [*ON_PLACE[:3], *quarter])[
         "success"
     ]  # a cup is round, a cube looks the same
+
+
+def test_goals_in_order_and_objects_that_must_stay():
+    success = replace(CUP_ON_PAD.success, also=None, in_order=True)
+    env = gym.make(register_task(replace(CUP_ON_PAD, name="cup_then_cube", success=success)))
+    assert put(env, ON_PAD, ON_PLACE)["success"]
+    assert put(env, [0.0, -0.15, 0.83, *UPRIGHT], ON_PLACE)["placed"] == 0  # the cube alone, whose turn is later
+    goals, success = {"cup": At("pad")}, replace(success, undisturbed={"cube": (0.02, 0.2)})
+    env = gym.make(register_task(replace(CUP_ON_PAD, name="cup_beside_cube", goals=goals, success=success)))
+    assert put(env, ON_PAD, ON_PLACE)["success"]
+    env.reset(seed=0)
+    progress, state = env.unwrapped._progress, env.unwrapped.sim.read()
+    for shift, failure in ((0.019, ""), (0.021, "constraint")):
+        poses = state.object_pose + np.array([[0.0] * 7, [shift, *[0.0] * 6]])
+        progress.view.see(state, env.unwrapped.sim, 0.0)
+        progress.update(state._replace(object_pose=poses))
+        assert (progress.failure, progress.failed) == (failure, bool(failure))
 
 
 def test_a_condition_of_failure_ends_the_episode(env):

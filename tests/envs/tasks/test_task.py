@@ -85,6 +85,11 @@ def task(**changes) -> Task:
         ({"passes": {"cube": (At("hole"),)}}, "passes: 'cube' refers to 'hole', which is not in the task"),
         ({"goals": {}}, "success: never comes: give goals, or a condition"),
         ({"success": Success({"lid": Tolerance()})}, "success.tolerances: 'lid' is not in the task"),
+        ({"success": Success(undisturbed={"lid": (0.1, 0.1)})}, "success.undisturbed: 'lid' is not in the task"),
+        (
+            {"success": Success(undisturbed={"cube": 0.1})},
+            r"undisturbed: of 'cube' is 0.1; expected \(distance",
+        ),
         ({"success": None}, "success: is a NoneType, not a Success"),
         ({"seconds": 0}, "seconds: 0 is not a time"),
     ],

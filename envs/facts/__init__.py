@@ -1,0 +1,1 @@
+"""Facts about tasks as data, and the pages that are made of them."""
