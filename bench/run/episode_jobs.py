@@ -248,23 +248,16 @@ def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str,
         task=config.task_words,
         robot=config.robot,
         level=config.level,
-        success=False,
-        safe=False,
-        stage="",
         failure_reason=reason,
         detail=" ".join(detail.split())[:300],
-        collision="",
-        seconds=0.0,
-        contacts=0,
-        clearance=None,
-        refused=0,
-        numbers={},
+        success=False, safe=False, stage="", collision="",
+        seconds=0.0, contacts=0, clearance=None, refused=0, numbers={},
         wall_seconds=seconds,
         tick_us=[0.0, 0.0, 0.0, 0.0],
         cell=config.digest(),
         clock=config.clock,
         delay=config.delay,
-    )
+    )  # fmt: skip
 
 
 def shown(policy: Policy, config: RunConfig, folder: Path) -> Answer:
