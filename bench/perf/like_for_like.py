@@ -17,11 +17,10 @@ import numpy as np
 from ...baselines.errors import MissingExtra
 from ...baselines.extras import needed
 from ...baselines.motion.rrt_connect import RrtSettings, joint_path
+from ...planner import Obstacle, Planner
 from ...planner.control.arm_arrays import arm_arrays
 from ...planner.control.pursuit import ARRIVED, fresh_pursuit_state
-from ...planner.geometry.shapes import Obstacle
 from ...planner.planning.joint_space_rrt import connect, joint_edge_is_clear
-from ...planner.planning.planner import Planner
 from ...planner.planning.planning_scene import PlanningScene, SceneTemplate
 from ...planner.planning.settings import JointSearchSettings
 from ...planner.safety.guarded_pursuit import guarded_roll_out

@@ -15,16 +15,11 @@ import numpy as np
 from ...baselines.programs.goal_choice import MotionChoice, choose
 from ...configs import RunConfig
 from ...envs.errors import NoRoom
-from ...planner.geometry.pose import Pose, PosePath
-from ...planner.geometry.shapes import Obstacle, Sphere
-from ...planner.imitation.tsia import imitated_path
-from ...planner.jit import kernel
-from ...planner.reactive.reactive_planner import ReactivePlanner
+from ...planner import Obstacle, Pose, PosePath, ReactivePlanner, Sphere, imitated_path
+from .fixed_loop import unit
 from .measuring import Row, row, seconds_per_call
 from .planner import problem
 
-ROUNDS = 72_000
-"""Rounds of the loop: it takes 1 ms of CPU where Pinocchio's FK + Jacobian of the Panda takes 0.7 us."""
 UNIT = "loops"
 GOALS = 12
 """Number of goals of a choice: grasps of a block, each a turn apart."""
@@ -39,23 +34,6 @@ CHOOSE = f"choice among {GOALS} goals / the fixed loop"
 DECIDE = "decision beside a mover, its longest tick / the fixed loop"
 LIMITS = {"99.9 %": 5.0, "longest": 20.0}
 """Limits of the ticks of whole episodes."""
-
-
-@kernel
-def _fixed_loop(rounds):
-    """Turn a quaternion many times: multiplications, a sine and a root, as in kinematics; this code never changes."""
-    w, x, y, z, angle = 1.0, 0.0, 0.0, 0.0, 0.1
-    for k in range(rounds):
-        s = math.sin(angle)
-        c = math.sqrt(1.0 - s * s)
-        w, x, y, z = c * w - s * z, c * x + s * y, c * y - s * x, c * z + s * w
-        angle = 0.1 + 1e-6 * (k & 1023) * x
-    return w + x + y + z
-
-
-def unit() -> float:
-    """Return the CPU time of the fixed loop [s] now."""
-    return seconds_per_call(partial(_fixed_loop, ROUNDS), clock=process_time)[0]
 
 
 def _in_loops(name: str, seconds: float, goal: float, note: str) -> Row:
