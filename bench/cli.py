@@ -223,6 +223,9 @@ def geometric(
 def perf(
     json: Annotated[Path | None, typer.Option("--json", help="Also write the rows to this file.")] = None,
     only: Annotated[str, typer.Option("--only", help="Part of a row's name, or a shell pattern.")] = "*",
+    long: Annotated[
+        bool, typer.Option("--long", help="Also the ticks of 20 episodes of nine cells: 20 minutes.")
+    ] = False,
 ) -> None:
     """Measure speeds, as ratios within one run: machines differ and are shared.
 
@@ -233,7 +236,7 @@ def perf(
     """
     from .perf.command import run_perf
 
-    raise typer.Exit(run_perf(only, json))
+    raise typer.Exit(run_perf(only, json, long=long))
 
 
 app.command()(mbm)

@@ -34,8 +34,10 @@ FAMILIES: dict[str, dict[str, str]] = {"robosuite": {"task": "Lift", "range": "D
 """Environments that are several tasks: the arguments that tell which, with their defaults."""
 RENAMED_METHODS = {"screw-no-repet": "screw-guard-only"}
 """Present names of methods by former ones, which are read everywhere; digests and hashes stay those of former names."""
-LATER = ("key_poses", "tool", "contents")
-"""Keys that are written, and part of the digest, only if they have a value."""
+LATER = ("key_poses", "tool", "contents", "clock", "delay")
+"""Keys that are written, and part of the digest, only if they have another value than their default."""
+WAITS, REAL = "waits", "real"
+"""Clocks of an episode, see `RunConfig.clock`."""
 
 
 def present_method(name: str) -> str:
@@ -73,6 +75,9 @@ class RunConfig(BaseModel):
             None: the tcp frame itself, at level T [0.1, 0, 0, 90].
         env: further arguments of the environment, like `n_blocks` of stacking.
         max_seconds: simulated time limit of an episode [s]; None: that of the task.
+        clock: "waits": the world waits while the policy computes; "real": it goes on, one held control step for each
+            control period that a call's CPU time takes beyond its own one. Then results depend on the machine.
+        delay: number of control steps by which every observation is late; the first one is repeated until then.
         video: whether to make videos: of the first failure of each kind, and of the first episode of a single cell.
         trajectories: whether to keep the measurements of every tick, one .npz per episode.
         settings: settings of the method, with its own keys.
@@ -95,6 +100,8 @@ class RunConfig(BaseModel):
     tool: Annotated[tuple[Meters, Meters, Meters, Degrees], Field(strict=False)] | None = None
     env: dict[str, Any] = Field(default_factory=dict)
     max_seconds: Annotated[float, Field(gt=0, le=3600)] | None = None
+    clock: Literal["waits", "real"] = WAITS
+    delay: Annotated[int, Field(ge=0, le=1000)] = 0
     video: bool = True
     trajectories: bool = False
     settings: dict[str, Any] = Field(default_factory=dict)
@@ -115,17 +122,20 @@ class RunConfig(BaseModel):
     @model_serializer(mode="wrap")
     def _without_what_is_not_asked_for(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # a cell without these keys keeps the digest it had before they were introduced
-        return {key: value for key, value in written(self).items() if value is not None or key not in LATER}
+        later = {key: type(self).model_fields[key].default for key in LATER}
+        return {key: value for key, value in written(self).items() if key not in later or value != later[key]}
 
     @property
     def condition(self) -> str:
-        """Level, number of key poses if limited, and tool unless the level implies it: "S 6" for six key poses."""
+        """Level, number of key poses if limited, tool unless the level implies it, clock and delay, like "S 6"."""
         implied = IMPLIED.get(self.level, {})
         words = [self.level]
         if self.key_poses is not None:
             words.append(f"{self.key_poses}" if "key_poses" in implied else f"{self.key_poses} key poses")
         if self.tool is not None and self.tool != implied.get("tool"):
             words.append("tool " + " ".join(f"{value:g}" for value in self.tool))
+        words += ["real clock"] if self.clock == REAL else []
+        words += [f"delay {self.delay}"] if self.delay else []
         return " ".join(words)
 
     @property

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +19,14 @@ from ..metrics.metrics import metrics_of
 from ..metrics.trace import Trace, TraceRecorder
 from ..statistics import median, quantile
 from .episode_records import EpisodeRecord
-from .scenarios import Scenario
+from .scenarios import Scenario, scenarios_of
+from .world_clock import SLOW, Observer, PacedWorld, Pacing
 
 GRACE_SECONDS = 2.0
 """Simulated time [s] between a policy declaring itself done and the end of the episode, so that a success can
 settle."""
 COMMON = ("is_success", "success", "safe", "n_contacts", "min_obstacle_distance", "layouts_refused")
 """Numbers and flags in `info` that every task has."""
-Observer = Callable[[Any, Any], None]
-"""Called with the environment and the observation at the start and after every step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,9 +37,10 @@ class Played:
         trace: measurements of every control tick.
         info: the environment's last `info`.
         report: the policy's last report.
-        ticks: real time of the policy per tick [s].
-        first: number of ticks until the first action that moves a joint; 0: no action did.
+        ticks: real time of the policy per answer [s].
+        first: number of answers until the first action that moves a joint; 0: no action did.
         begun: start time by `time.perf_counter` [s].
+        world: the environment as the policy saw it, with its number of steps and the policy's CPU times.
     """
 
     trace: Trace
@@ -48,6 +49,7 @@ class Played:
     ticks: list[float]
     first: int
     begun: float
+    world: PacedWorld
 
 
 def run_episode(
@@ -65,11 +67,13 @@ def run_episode(
     Returns:
         Record of the episode, and the policy's last report.
     """
-    played = play(env, policy, scenario, observer)
+    played = play(env, policy, scenario, observer, Pacing.of(config))
     return episode_record(env, played, scenario, config), played.report
 
 
-def play(env: Any, policy: Policy, scenario: Scenario, observer: Observer | None = None) -> Played:
+def play(
+    env: Any, policy: Policy, scenario: Scenario, observer: Observer | None = None, pacing: Pacing | None = None
+) -> Played:
     """Let a policy act in a scenario until it is over; exceptions of the policy pass through.
 
     Args:
@@ -77,26 +81,37 @@ def play(env: Any, policy: Policy, scenario: Scenario, observer: Observer | None
         policy: acts in the environment.
         scenario: start of the episode.
         observer: called at the start and after every step, see `Observer`; None: no calls.
+        pacing: how time passes; None: the world waits, and observations are not late.
     """
     begun, recorder = time.perf_counter(), TraceRecorder(env)
-    observation, info = env.reset(seed=scenario.seed, options={"level": scenario.level})
+    world = PacedWorld(env, pacing or Pacing(), _watching(recorder, observer))
+    world.begin(scenario)
     dt, arms = env.unwrapped.control_dt, len(env.unwrapped.arms)
     state, report, ticks, first, grace = None, PolicyReport(), [], 0, round(GRACE_SECONDS / dt)
-    watch = _watching(recorder, observer)
-    watch(env, observation)
-    over = False
-    while not over and grace > 0:
+    while not world.over and grace > 0:
         before = time.perf_counter()
-        action, state = policy.predict(observation, state)
+        action, state = world.timed_call(partial(policy.predict, world.seen, state))
         ticks.append(time.perf_counter() - before)
         first = first or (len(ticks) if np.reshape(action, (arms, -1))[:, :-1].any() else 0)
-        observation, _, terminated, truncated, info = env.step(action)
-        over = terminated or truncated
-        watch(env, observation)
+        passed = world.hold(policy, state) + 1
+        world.step(action)
         report = _report(policy, state)
         if report.done:
-            grace = 0 if report.failure_reason else grace - 1
-    return Played(recorder.trace(), info, report, ticks, first, begun)
+            grace = 0 if report.failure_reason else grace - passed
+    return Played(recorder.trace(), world.info, report, ticks, first, begun, world)
+
+
+def rehearse(env: Any, policy: Policy, config: RunConfig) -> None:
+    """Play the first scenario of a cell while the world waits: loading compiled code then costs no time later.
+
+    Args:
+        env: environment of the config.
+        policy: policy of the config.
+        config: config of the cell.
+    """
+    # whatever fails here fails in an episode too, and is recorded there
+    with suppress(Exception):
+        play(env, policy, scenarios_of(config)[0])
 
 
 def _watching(recorder: TraceRecorder, observer: Observer | None) -> Observer:
@@ -127,7 +142,7 @@ def episode_record(
         played.trace.save(trajectories / f"{config.digest()}-{scenario.index}.npz")
     shown, solids = demonstration_named(config.demonstration), solids_of(env.unwrapped.sim)
     metrics = metrics_of(played.trace, solids, config.task, numbers, shown, success=success)
-    seconds = env.unwrapped.control_dt * len(played.ticks)
+    seconds, world = env.unwrapped.control_dt * played.world.steps, played.world
     reason, detail = failure(info, played.report, seconds)
     clearance, ticks = float(info["min_obstacle_distance"]), played.ticks
     times = (median(ticks), quantile(ticks, 0.99), max(ticks), sum(ticks[: played.first or None]))
@@ -153,6 +168,12 @@ def episode_record(
         metrics=metrics,
         wall_seconds=time.perf_counter() - played.begun,
         tick_us=[1e6 * value for value in times],
+        clock=config.clock,
+        delay=config.delay,
+        calls=len(ticks),
+        slow_calls=sum(value > SLOW for value in world.cpu_seconds),
+        longest_ms=1e3 * max(world.cpu_seconds),
+        held=world.held,
     )
 
 

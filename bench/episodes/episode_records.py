@@ -12,15 +12,17 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any
 
-from ...configs.run_config import first_method, present_method
+from ...configs.run_config import REAL, WAITS, first_method, present_method
 from ...planner.errors import OneDemoError
 from ..workers.dispatcher import HUNG, WORKER_DIED
 
 FILE = "episodes.jsonl"
 FORMAT = 1
 """Format version of a line; lines of other versions are not read."""
-TIMINGS = ("wall_seconds", "tick_us")
+TIMINGS = ("wall_seconds", "tick_us", "calls", "slow_calls", "longest_ms", "held")
 """Fields that are not part of the result because they differ from run to run."""
+LATER = {"clock": WAITS, "delay": 0}
+"""Fields that are part of the result only if they have another value than this: earlier results keep their hash."""
 
 
 class RunBusy(OneDemoError):
@@ -59,6 +61,12 @@ class EpisodeRecord:
         cell: digest of the cell's config.
         scenario: fingerprint of the scenario.
         metrics: values by name, see `metric_table`; None if there was nothing to measure.
+        clock: clock of the episode, see `RunConfig.clock`; with "real" the whole result depends on the machine.
+        delay: number of control steps by which observations were late.
+        calls: number of the policy's answers; 0 if unknown, in records of earlier versions and of lost episodes.
+        slow_calls: number of those that took more than `world_clock.SLOW` of CPU time.
+        longest_ms: longest CPU time of an answer [ms].
+        held: number of control steps that passed while the policy had not answered yet.
     """
 
     index: int
@@ -83,6 +91,12 @@ class EpisodeRecord:
     cell: str = ""
     scenario: str = ""
     metrics: dict[str, float | None] = field(default_factory=dict)
+    clock: str = WAITS
+    delay: int = 0
+    calls: int = 0
+    slow_calls: int = 0
+    longest_ms: float = 0.0
+    held: int = 0
 
     @property
     def key(self) -> tuple[str, int]:
@@ -93,6 +107,11 @@ class EpisodeRecord:
     def lost(self) -> bool:
         """True if the outcome is unknown because the worker died or hung."""
         return self.failure_reason in (WORKER_DIED, HUNG) and self.seconds == 0.0
+
+    @property
+    def reproducible(self) -> bool:
+        """True unless the world went on while the policy computed: only these results have a hash."""
+        return self.clock != REAL
 
     @property
     def safe_success(self) -> bool:
@@ -115,7 +134,8 @@ def known_record(values: dict[str, Any]) -> EpisodeRecord:
 
 def result_of(record: EpisodeRecord) -> dict[str, Any]:
     """Return the fields of a record that do not differ from run to run."""
-    values = {key: value for key, value in asdict(record).items() if key not in TIMINGS}
+    left_out = (*TIMINGS, *(key for key, default in LATER.items() if getattr(record, key) == default))
+    values = {key: value for key, value in asdict(record).items() if key not in left_out}
     return {**values, "method": first_method(record.method)}
 
 

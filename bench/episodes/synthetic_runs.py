@@ -17,6 +17,7 @@ from .episode_records import FILE, EpisodeRecord, encoded
 from .run_folder import CELLS, VERSION
 from .scenarios import Suite, frozen, place_of
 from .start_states import obstacle
+from .world_clock import SLOW
 
 METHODS = ("screw", "decoupled", "replay", "dmp-goal", "potential", "rrt")
 LEVELS = ("L1", "L2", "L3", "L4")
@@ -125,7 +126,9 @@ def _record(cell: RunConfig, scenario: dict[str, Any], rng: np.random.Generator)
         _numbers(task), 1.0, [], cell.digest(), scenario["fingerprint"], metrics,
     )  # fmt: skip
     tick = TICKS.get(method, 50.0) * float(rng.lognormal(0.0, 0.1))
-    return replace(blank, tick_us=[tick, 4.0 * tick, 4.0 * tick * float(rng.lognormal(3.0, 0.6)), 2.0 * tick])
+    longest = 4.0 * tick * float(rng.lognormal(3.0, 0.6))
+    times = {"calls": round(50.0 * seconds), "slow_calls": int(longest > 1e6 * SLOW), "longest_ms": 0.001 * longest}
+    return replace(blank, tick_us=[tick, 4.0 * tick, longest, 2.0 * tick], **times)
 
 
 def _numbers(task: str) -> dict[str, list[float]]:

@@ -18,6 +18,7 @@ import numpy as np
 from ...planner.errors import UnknownName
 from ..console import check_writable, console, labeled, writing
 from .learning import LEARNING_LINES
+from .like_for_like import LIKE_LINES
 from .measuring import Row, row, seconds_per_call
 from .near_contact import NEAR_LINES
 from .peers import READY, dq_robotics_tick, panda_urdf, pinocchio_kinematics
@@ -25,6 +26,7 @@ from .planner import LINES
 from .report import REPORT_LINES
 from .runs import RUN_LINES
 from .tasks import TASK_LINES, started
+from .thinking import LONG_LINES, THINKING_LINES
 
 TICK = "controller tick from Python / DQ_Robotics"
 KINEMATICS = "FK + Jacobian call / Pinocchio"
@@ -144,20 +146,28 @@ def _measured(code: str) -> float:
 
 
 Lines = dict[str, Callable[[], Row]]
+LONG = "ticks"
+"""Group that is measured only where it is asked for: 180 episodes, some twenty minutes."""
 GROUPS: dict[str, Lines] = {
     "controller": {TICK: _tick, KINEMATICS: _kinematics},
-    "planner": {**LINES, **NEAR_LINES},
+    "planner": {**LINES, **NEAR_LINES, **LIKE_LINES},
     "step": {**TASK_LINES, PEER_STEP: _peer_step},
     "run": RUN_LINES,
     "process": {MEMORY: _memory, IMPORT: _import, START: _start, HELP: _help},
     "report": REPORT_LINES,
     "learning": LEARNING_LINES,
+    "thinking": THINKING_LINES,
+    LONG: LONG_LINES,
 }
 """Measurements by group and name."""
 
 
-def matching(pattern: str) -> Lines:
+def matching(pattern: str, *, long: bool = False) -> Lines:
     """Return the measurements whose group or name matches a shell pattern, or whose name contains it; measure nothing.
+
+    Args:
+        pattern: shell pattern, or part of a name.
+        long: whether those of the long group are among them, too.
 
     Raises:
         UnknownName: no measurement matches; the message lists groups and names.
@@ -165,6 +175,7 @@ def matching(pattern: str) -> Lines:
     found = {
         name: measure
         for group, lines in GROUPS.items()
+        if long or group != LONG
         for name, measure in lines.items()
         if fnmatch(group, pattern) or fnmatch(name.lower(), f"*{pattern.lower()}*")
     }
@@ -184,12 +195,13 @@ def write_json(rows: list[Row], path: Path) -> None:
     path.write_text(json.dumps({"rows": [asdict(line) for line in rows]}, indent=2) + "\n", encoding="utf-8")
 
 
-def run_perf(pattern: str, json_file: Path | None) -> int:
+def run_perf(pattern: str, json_file: Path | None, *, long: bool = False) -> int:
     """Measure and print a table.
 
     Args:
         pattern: shell pattern of groups or names; see `matching`.
         json_file: file for the rows, or None.
+        long: also measure whole episodes, which takes long.
 
     Returns:
         The exit code: 1 if a row misses its limit.
@@ -198,7 +210,7 @@ def run_perf(pattern: str, json_file: Path | None) -> int:
         UnknownName: no measurement matches the pattern.
         BadConfig: the file cannot be written, which is checked before anything is measured.
     """
-    wanted = matching(pattern)
+    wanted = matching(pattern, long=long)
     if json_file:
         check_writable("--json", json_file)
     out, rows = console(), []

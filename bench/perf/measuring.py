@@ -47,19 +47,22 @@ def row(name: str, value: float, unit: str, goal: float | None, note: str = "") 
     return Row(name, value, unit, goal, None if goal is None else value <= goal, note)
 
 
-def seconds_per_call(*functions: Callable[[], object], together: bool = False) -> list[float]:
+def seconds_per_call(
+    *functions: Callable[[], object], together: bool = False, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
     """Return the median time [s] per call of each function; interleaved batches expose all functions to the same noise.
 
     Args:
         functions: functions to measure.
         together: call all functions equally often, for functions that step through the same states.
+        clock: what is measured [s]: elapsed time, or `time.process_time` for work that other programs interrupt.
     """
     counts = []
     for function in functions:
         function()
-        start = time.perf_counter()
+        start = clock()
         function()
-        counts.append(max(1, round(BATCH_SECONDS / max(time.perf_counter() - start, 1e-9))))
+        counts.append(max(1, round(BATCH_SECONDS / max(clock() - start, 1e-9))))
     if together:
         counts = [min(counts)] * len(counts)
     samples: list[list[float]] = [[] for _ in functions]
@@ -67,8 +70,8 @@ def seconds_per_call(*functions: Callable[[], object], together: bool = False) -
     for batch in range(BATCHES):
         # alternating order, so that a periodic disturbance does not always hit the same function
         for function, count, sample in runs[:: -1 if batch % 2 else 1]:
-            start = time.perf_counter()
+            start = clock()
             for _ in range(count):
                 function()
-            sample.append((time.perf_counter() - start) / count)
+            sample.append((clock() - start) / count)
     return [statistics.median(sample) for sample in samples]

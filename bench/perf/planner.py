@@ -200,7 +200,7 @@ def _demo(count: int) -> PosePath:
 
 
 @cache
-def _problem() -> tuple[Planner, PosePath, np.ndarray, Pose, Obstacle]:
+def problem() -> tuple[Planner, PosePath, np.ndarray, Pose, Obstacle]:
     """Return a planner, a demonstration of 100 poses, start joints, a goal and an obstacle on the path."""
     arm, body, q = _panda()
     goal = Pose.from_position_quaternion([0.05, 0.3, 0.95], DOWN)
@@ -209,7 +209,7 @@ def _problem() -> tuple[Planner, PosePath, np.ndarray, Pose, Obstacle]:
 
 
 def _plan_row(name: str) -> Row:
-    planner, demo, q, goal, ball = _problem()
+    planner, demo, q, goal, ball = problem()
     try:
         import_module("ompl.base")
     except ImportError:
@@ -229,14 +229,14 @@ def _plan_row(name: str) -> Row:
 
 
 def _plan_slope(name: str) -> Row:
-    planner, _, q, goal, _ = _problem()
+    planner, _, q, goal, _ = problem()
     sizes = np.array([50, 200, 800, 2000])
     demos = [_demo(int(n)) for n in sizes]
     return _slope(name, sizes, seconds_per_call(*(partial(planner.plan, demo, q, goal, []) for demo in demos)))
 
 
 def _batch_row(name: str) -> Row:
-    planner, demo, q, goal, ball = _problem()
+    planner, demo, q, goal, ball = problem()
     rng = np.random.default_rng(0)
     goals = [
         Pose.from_position_quaternion(goal.position + rng.uniform(-0.1, 0.1, 3), goal.quaternion) for _ in range(64)

@@ -105,7 +105,8 @@ def merged(runs: list[Run]) -> Run:
         warnings += run.warnings
         for digest, found in run.records.items():
             known = records.setdefault(digest, {})
-            differing = sum(r.index in known and result_of(r) != result_of(known[r.index]) for r in found)
+            twice = [r for r in found if r.index in known and r.reproducible]
+            differing = sum(result_of(r) != result_of(known[r.index]) for r in twice)
             if differing:
                 warnings.append(f"{run.folders[0]}: {differing} episodes of cell {digest} ended differently before")
             records[digest] = {**{r.index: r for r in found}, **known}
@@ -146,8 +147,9 @@ def _is_sound(record: EpisodeRecord) -> bool:
     number = (int, float)
     return (
         all(isinstance(getattr(record, name), str) for name in _WORDS)
-        and all(isinstance(getattr(record, name), int) for name in ("index", "seed", "contacts", "refused"))
+        and all(isinstance(getattr(record, name), int) for name in _COUNTS)
         and isinstance(record.seconds, number)
+        and isinstance(record.longest_ms, number)
         and isinstance(record.wall_seconds, number)
         and isinstance(record.metrics, dict)
         and all(value is None or isinstance(value, number) for value in record.metrics.values())
@@ -157,6 +159,7 @@ def _is_sound(record: EpisodeRecord) -> bool:
     )
 
 
+_COUNTS = [field.name for field in fields(EpisodeRecord) if field.type == "int"]
 _WORDS = [field.name for field in fields(EpisodeRecord) if field.type == "str"]
 
 

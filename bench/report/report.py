@@ -21,7 +21,7 @@ from . import tables
 from .groups import UNSAFE, Group, groups_of, metric_tests, success_tests
 from .pictures import drawn, with_caption
 from .read_runs import Run, merged, read_run
-from .summary import SUMMARY, summary_row, write_summary
+from .summary import SUMMARY, clocks, summary_row, write_summary
 from .tables_csv import write_tables
 
 INTERVALS = "Whiskers and brackets are Wilson 95 % intervals of single cells; nothing is pooled over levels."
@@ -163,6 +163,7 @@ def _opening(run: Run, groups: list[Group]) -> list[Block]:
     items = [
         *(f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in words.items()),
         "Success is judged by the simulator; safe success is success without any unwanted contact.",
+        *(f"{line[0].upper()}{line[1:]}." for line in clocks(_rows(run))),
         f"Scenarios: {run.suite.summary()}.",
         *([f"Unfinished: {missing} of the planned episodes are missing."] if missing else []),
         *run.warnings,
@@ -219,6 +220,12 @@ def _better(better: str) -> str:
     return f" ({better} is better)" if better else ""
 
 
+def _left_out(run: Run) -> str:
+    """Return what the hash of the results leaves out."""
+    live = any(not record.reproducible for record in run.every)
+    return "times and episodes with a real clock left out" if live else "times left out"
+
+
 def _repeating(run: Run) -> list[Block]:
     environment = {key: value for key, value in run.environment.items() if key not in ("packages", "command")}
     packages = run.environment.get("packages")
@@ -234,7 +241,7 @@ def _repeating(run: Run) -> list[Block]:
         Bullets(
             [
                 f"hash of the scenarios: {run.suite.hash}",
-                f"hash of the results, times left out, the same for any executor: {table_hash(run.every)}",
+                f"hash of the results, {_left_out(run)}, the same for any executor: {table_hash(run.every)}",
                 *(f"{key}: {value}" for key, value in environment.items()),
                 *([f"versions: {versions}"] if versions else []),
             ]

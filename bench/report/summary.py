@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from ...configs import RunConfig
+from ...configs.run_config import REAL
 from ...envs import facts_of
 from ..atomic_files import write_whole
+from ..console import counted
 from ..episodes.episode_records import EpisodeRecord
+from ..episodes.world_clock import SLOW
 from ..statistics import median, wilson
 from .groups import outcome_of
 
@@ -50,12 +53,34 @@ def summary_row(config: RunConfig, records: list[EpisodeRecord]) -> dict[str, An
         **_middle_and_most("tick_us", [record.tick_us[0] for record in timed]),
         "tick_us_p99": _middle([record.tick_us[1] for record in timed]),
         "tick_us_max": max((record.tick_us[2] for record in timed), default=None),
+        "clock": config.clock,
+        "delay": config.delay,
+        "calls": sum(record.calls for record in records),
+        "slow_calls": sum(record.slow_calls for record in records),
+        "longest_ms": max((record.longest_ms for record in records if record.calls), default=None),
+        "held": sum(record.held for record in records),
         "touching": sum(record.contacts > 0 for record in records),
         "clearance_mm_min": min(clearances, default=None),
         "refused": sum(record.refused for record in records),
         "failures": dict(Counter(outcome_of(record) for record in records if not record.success)),
         "failure_details": _details(records),
     }
+
+
+def clocks(rows: list[dict[str, Any]]) -> list[str]:
+    """Return a line for each clock and delay in the rows of a summary: what it is, and how many ticks were slow."""
+    lines = []
+    conditions = {(row["clock"], row["delay"]) for row in rows}
+    for clock, delay in sorted(conditions, key=lambda each: (each[0] == REAL, each[1])):
+        here = [row for row in rows if (row["clock"], row["delay"]) == (clock, delay)]
+        slow, calls, held = (sum(row[key] for row in here) for key in ("slow_calls", "calls", "held"))
+        goes_on = f"real, the world went on for {counted(held, 'tick')} while the policy computed"
+        words = goes_on if clock == REAL else "the world waits while the policy computes"
+        late = f", observations are {counted(delay, 'tick')} late" if delay else ""
+        worst = max(row["longest_ms"] or 0.0 for row in here)
+        times = f"; {slow} of {calls} ticks above {1e3 * SLOW:.0f} ms of CPU time, the longest {worst:.0f} ms"
+        lines.append(f"clock: {words}{late}{times if calls else ''}")
+    return lines
 
 
 def _details(records: list[EpisodeRecord]) -> dict[str, list[str]]:

@@ -9,7 +9,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..document.document import Entry, Link, Table
+from ..episodes.episode_records import EpisodeRecord
 from ..episodes.failure_selection import Video
+from ..episodes.world_clock import SLOW
 from ..method_table import ACTOR_KEYS, REFERENCE, STEPS_KEYS, WITHOUT_DEMONSTRATION, place_of
 from ..metrics.metric_table import METRICS
 from ..statistics import Rate, interquartile_mean, median
@@ -218,9 +220,20 @@ def timing(groups: list[Group]) -> Table:
                     median(starts),
                     median(speeds),
                 ]
-                rows.append([task, robot, line.label, *map(number, values)])
+                rows.append([task, robot, line.label, *map(number, values), *_slowest(records)])
     head = ["median [ms]", "99 % [ms]", "longest [ms]", "to the first motion [ms]", "times real time"]
+    head += [f"above {1e3 * SLOW:.0f} ms of CPU time", "longest CPU time [ms]", "held ticks"]
     return Table(["task", "robot", "method", *head], rows, 3)
+
+
+def _slowest(records: list[EpisodeRecord]) -> list[Entry]:
+    """Return how many answers took more than `SLOW` of CPU time, the longest [ms], and the held control steps."""
+    known = [record for record in records if record.calls]
+    if not known:
+        return [NOTHING] * 3
+    slow, calls, held = (sum(getattr(each, name) for each in known) for name in ("slow_calls", "calls", "held"))
+    live = any(not record.reproducible for record in known)
+    return [f"{slow} of {calls}", number(max(each.longest_ms for each in known)), str(held) if live else NOTHING]
 
 
 def costs(groups: list[Group]) -> Table:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...baselines.own_policy import is_own
 from ...configs import BadConfig, Grid, RunConfig
 from ...configs.errors import unknown_key
-from ...configs.run_config import FAMILIES
+from ...configs.run_config import FAMILIES, REAL, WAITS
 from ...envs import TASKS, facts_of
 from ...envs.dotted_names import BadDottedName, is_dotted
 from ...planner.errors import BadDemonstration, BadOption, UnknownName
@@ -56,7 +56,8 @@ def known_names() -> dict[str, Iterable[str | None]]:
     from ...envs import LEVELS, ROBOTS
     from ...envs.core.levels import OBSTACLES
 
-    return {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
+    named = {"task": TASKS, "level": LEVELS, "robot": ROBOTS, "method": POLICIES, "obstacles": (None, *OBSTACLES)}
+    return {**named, "clock": (WAITS, REAL)}
 
 
 def level_words() -> str:

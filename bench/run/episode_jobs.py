@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...configs import BadConfig, RunConfig
-from ...configs.run_config import cell_of
+from ...configs.run_config import REAL, cell_of
 from ...envs import facts_of
 from ...envs.errors import NoRoom
 from ...planner import Pose
@@ -85,6 +85,10 @@ class EpisodeJobs:
         env, own = self._environments[place], f"{place} {config.digest()}"
         if own not in self._policies:
             self._policies[own] = policy_for(env, config)
+            if config.clock == REAL:
+                from ..episodes.episode import rehearse
+
+                rehearse(env, self._policies[own], config)
             for _ in range(len(self._policies) - MAX_POLICIES):
                 self._policies.popitem(last=False)
         self._policies.move_to_end(own)
@@ -201,6 +205,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRec
     """
     from ..episodes.episode import episode_record, play
     from ..episodes.start_states import check_start, drawn_start
+    from ..episodes.world_clock import Pacing
 
     scenario, started, checked = scenarios_of(config)[job["index"]], time.perf_counter(), False
 
@@ -212,7 +217,7 @@ def episode(env: Any, policy: Policy, config: RunConfig, job: Job) -> EpisodeRec
 
     kept = Path(job["trajectories"]) if job.get("trajectories") else None
     try:
-        played = play(env, policy, scenario, observer)
+        played = play(env, policy, scenario, observer, Pacing.of(config))
     except ScenarioChanged:
         raise
     except Exception as error:
@@ -243,21 +248,16 @@ def lost_record(config: RunConfig, scenario: Scenario, reason: str, detail: str,
         task=config.task_words,
         robot=config.robot,
         level=config.level,
-        success=False,
-        safe=False,
-        stage="",
         failure_reason=reason,
         detail=" ".join(detail.split())[:300],
-        collision="",
-        seconds=0.0,
-        contacts=0,
-        clearance=None,
-        refused=0,
-        numbers={},
+        success=False, safe=False, stage="", collision="",
+        seconds=0.0, contacts=0, clearance=None, refused=0, numbers={},
         wall_seconds=seconds,
         tick_us=[0.0, 0.0, 0.0, 0.0],
         cell=config.digest(),
-    )
+        clock=config.clock,
+        delay=config.delay,
+    )  # fmt: skip
 
 
 def shown(policy: Policy, config: RunConfig, folder: Path) -> Answer:

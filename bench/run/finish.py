@@ -14,7 +14,7 @@ from ..episodes.episode_records import EpisodeRecord
 from ..episodes.failure_selection import FILMED, chosen, video_of
 from ..episodes.run_folder import FIGURE, SHOWN, VIDEO, written_json
 from ..report.report import write_report
-from ..report.summary import SUMMARY, verdict, why_failed
+from ..report.summary import SUMMARY, clocks, verdict, why_failed
 from ..workers.dispatcher import Executor, Outcome
 
 
@@ -77,6 +77,7 @@ def report(folder: Path) -> list[str]:
     lines = verdict(rows[0]) if len(rows) == 1 else []
     for row in rows if len(rows) > 1 else ():
         lines += [f"{row['label']}: {verdict(row)[0]}", *why_failed(row)]
+    lines += clocks(rows)
     lines += [f"report  {files[0]}", f"page    {files[1]}"]
     for name, file in (("figure", FIGURE), ("video", VIDEO)):
         if problem := shown.get(f"{name}_problem"):

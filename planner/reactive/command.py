@@ -48,8 +48,8 @@ class ReactiveSettings:
         patience: seconds without progress after which the motion is planned anew, moving obstacles taken as static.
         give_up: seconds without progress in total after which the motion has failed.
         lead: seconds by which the safety layer sees moving obstacles ahead of time, for an arm that lags.
-        budget: cost [us] of the planning that is done in a tick, see `planner.resumable`; inf: a tick takes as long as
-            its plan does.
+        thinking: share of a tick that is spent on planning, by counted costs, see `planner.resumable`; inf: a tick
+            takes as long as its plan does.
     """
 
     plan: PlanSettings = field(default_factory=PlanSettings)
@@ -57,15 +57,20 @@ class ReactiveSettings:
     patience: float = 1.5
     give_up: float = 40.0
     lead: float = 0.05
-    budget: float = 4000.0
+    thinking: float = 0.2
 
     def __post_init__(self):
         checked_kind("plan", self.plan, PlanSettings)
         check_ranges(self, "[0, 60)", "horizon", "lead")
         check_ranges(self, "(0, inf)", "patience", "give_up")
-        check_ranges(self, "(0, inf]", "budget")
+        check_ranges(self, "(0, inf]", "thinking")
         if self.patience > self.give_up:
             raise BadOption("patience", f"need 0 < patience <= give_up, got {self.patience} and {self.give_up}")
+
+    @property
+    def budget(self) -> float:
+        """Cost [us] of the planning that is done in a tick."""
+        return 1e6 * self.thinking * self.plan.motion.dt
 
 
 class Command(NamedTuple):

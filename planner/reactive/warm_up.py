@@ -51,7 +51,7 @@ def warm_up(arm: Arm, body: Body) -> None:
     point, path = Body(row[None], ("point",)), _upwards(arm.fk(q))
     _algebra(path.dqs)
     for seen in ((FAR,), (replace(FAR, velocity=SLOW),)):
-        _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT, budget=inf)), q, path, seen)
+        _follow(ReactivePlanner(arm, point, ReactiveSettings(plan=SHORT, thinking=inf)), q, path, seen)
     _search(arm, point, q)
     SafetyLayer((arm,), (point,), (FAR,), SHORT.motion.dt)(q, np.zeros(arm.dof))
     Controller(arm)(q, path[-1])

@@ -256,6 +256,13 @@ def test_perf_runs_what_matches_and_nothing_else(monkeypatch, capsys, tmp_path):
     ran.clear()
     assert called(monkeypatch, capsys, "perf", "--only", "process")[0] == 0
     assert ran == [perf.MEMORY, perf.IMPORT, perf.START, perf.HELP]
+    ran.clear()
+    assert called(monkeypatch, capsys, "perf")[0] == 0
+    long = list(perf.GROUPS[perf.LONG])
+    assert len(long) == 18 and not set(long) & set(ran)
+    ran.clear()
+    assert called(monkeypatch, capsys, "perf", "--long", "--only", "ticks")[0] == 0
+    assert ran == long
 
 
 def test_a_file_that_cannot_be_written_after_all_is_one_line(monkeypatch, capsys, tmp_path):

@@ -188,6 +188,6 @@ def test_a_report_is_made_of_the_folder_alone(tmp_path):
     for cell in grid.cells:
         assert f"| {cell.task} {cell.level} | screw trim={cell.settings['trim']} | 12 |" in text
         assert any(line.startswith(f"{grid.label(cell)}: ") for line in lines)
-    assert len([line for line in lines if not line.startswith("  ")]) == 6
+    assert len([line for line in lines if not line.startswith("  ")]) == 7
     with pytest.raises(BadConfig, match="is this a run folder"):
         report(tmp_path)
