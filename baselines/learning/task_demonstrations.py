@@ -47,7 +47,7 @@ def task_episode(env: Any, demonstration: Demonstration, *, seed: int = 0) -> Tr
         BadDemonstration: it shows no skill, or none in this task.
         BadOption: see `demo_episode`; or the skill moves several things, or something on a hinge.
     """
-    facts: TaskFacts = env.unwrapped.FACTS
+    facts: TaskFacts = env.unwrapped.declared.facts
     if facts.playback is not None:
         played, playback = facts.playback, Playback(**facts.playback.options)
         return demo_episode(

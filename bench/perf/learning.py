@@ -11,7 +11,7 @@ import gymnasium as gym
 from ...baselines.errors import MissingExtra
 from ...configs import TrainConfig
 from ...envs import TASKS
-from ...envs.core.single_motion import HORIZON
+from ...envs.core.goal_form import HORIZON
 from .measuring import Row, row, seconds_per_call
 
 SHARE = 0.85

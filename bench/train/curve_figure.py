@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...envs.core.single_motion import HORIZON
+from ...envs.core.goal_form import HORIZON
 from ..drawing.figure_style import COLUMN, LEGEND_ROW, legend_above, saved, styled
 from ..method_table import Look, look_of, other_look
 from ..report.rate_figures import share_axis

@@ -12,7 +12,7 @@ from ...baselines.learning.feature_scaling import Normalization
 from ...baselines.learning.features import OBSTACLE
 from ...configs import TrainConfig, load_demonstration
 from ...envs import facts_of
-from ...envs.core.single_motion import LAST_ACTION
+from ...envs.core.goal_form import LAST_ACTION
 from ...planner import Demonstration
 
 GOALS = ("achieved_goal", "desired_goal")

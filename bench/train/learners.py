@@ -13,7 +13,7 @@ from ...baselines.extras import needed
 from ...configs import BadConfig, TrainConfig
 from ...configs.errors import unknown_key
 from ...configs.learner_arguments import DEFAULTS, misfit_of
-from ...envs.core.single_motion import HORIZON
+from ...envs.core.goal_form import HORIZON
 from ...planner.errors import BadOption
 from .learner_env import base_env, learners_env, shown
 

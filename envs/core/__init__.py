@@ -1,1 +1,1 @@
-"""Parts shared by all tasks: base class, levels, obstacle placement, progress, spaces."""
+"""The one environment, and what a task declares to it: levels, obstacle placement, spaces, goal form."""

@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 
 from ...planner import Arm, Body, Obstacle, Pose, Shape
-from ..scene.scene_objects import CompoundBody, FreeThing, Furniture, extents
+from ..scene.robot_description import robot_parts
+from ..scene.scene_objects import TABLE_HEIGHT, CompoundBody, FreeThing, Furniture, SceneSpec, extents
+from ..simulation.simulation import Simulation
 
+SLOTS = 3
+"""Largest number of obstacles at once."""
 FAILURES = (
     "ik_or_limit",
     "collision",
@@ -132,3 +136,35 @@ class TaskDescription:
     control_mode: str = "joint_velocity"
     scene_joints: tuple[str, ...] = ()
     skill: Any = None
+
+
+def described_scene(
+    sim: Simulation, name: str, things: SceneSpec, dt: float, control_mode: str, skill: Any
+) -> TaskDescription:
+    """Return the description of a task whose scene consists of a robot and things at the table.
+
+    Args:
+        sim: simulation of the scene.
+        name: of the task.
+        things: contents of the scene besides the robot.
+        dt: time between actions [s].
+        control_mode: meaning of an action.
+        skill: see `TaskDescription`.
+    """
+    parts, arms = robot_parts(sim.scene), tuple(index.arm for index in sim.scene.arms)
+    return TaskDescription(
+        name=name,
+        robot=sim.scene.robot.name,
+        arms=arms,
+        control_dt=dt,
+        objects=tuple(TaskObject.of(each) for each in things.objects),
+        bodies=parts.bodies,
+        table_height=TABLE_HEIGHT,
+        fixtures=parts.fixtures,
+        gripper_width=tuple(sim.widest_opening(k) for k in range(len(arms))),
+        furniture=tuple(TaskFurniture.of(each) for each in things.furniture),
+        touching=parts.touching,
+        obstacles=SLOTS,
+        control_mode=control_mode,
+        skill=skill,
+    )

@@ -1,94 +1,80 @@
-"""Base class of all tasks: the Gymnasium interface around a simulation."""
+"""The environment of all tasks: the Gymnasium interface around a simulation."""
 
 from __future__ import annotations
 
 import copy
-import math
-from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.spaces.utils import flatten
 
 from ...planner import Obstacle, Pose
 from ...planner.errors import BadOption
 from ..errors import BadAction, NoRoom
 from ..facts.page import Page
-from ..facts.task_facts import TaskFacts
-from ..judge.progress import Progress
-from ..scene.robot_description import robot_parts
-from ..scene.robots import Robot
-from ..scene.scene import OBSTACLE, CompiledScene, compiled_scene
-from ..scene.scene_objects import TABLE_HEIGHT, SceneSpec
+from ..scene.scene import OBSTACLE, compiled_scene
 from ..simulation.moving_obstacles import ScheduledObstacle
-from ..simulation.render import TABLE_VIEW, Ghost, Renderer, View
+from ..simulation.render import Ghost, Renderer
 from ..simulation.simulation import PHYSICS_DT, Simulation, Start, substeps_at
 from ..simulation.state import State
 from ..simulation.twist_control import TwistDrive
+from . import goal_form as forms
 from . import spaces as space
-from .description import TaskDescription, TaskFurniture, TaskObject
+from .declared_task import DeclaredTask, TaskEpisode, World
+from .description import SLOTS, TaskDescription, described_scene
 from .levels import checked_obstacles, level_named
 from .obstacle_placement import placed
-from .placement_context import ObstacleRequest, PlacementContext, PlacementMotion
+from .placement_context import PlacementContext
 from .reset_options import checked_choice
 
 CONTROL_MODES = ("joint_velocity", "ee_twist")
 REWARDS = ("sparse", "dense")
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
-SLOTS = 3
-"""Largest number of obstacles at once."""
 MAX_LAYOUTS = 40
 """Largest number of starts drawn per reset until the obstacles fit."""
 Observation = dict[str, np.ndarray]
-ProgressT = TypeVar("ProgressT", bound=Progress)
-"""Progress class of a task."""
 
 
-class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
+class TaskEnv(gym.Env[Observation, np.ndarray]):
     """A task at a table: control at a rate that divides the physics' 500 Hz, success judged by the simulator.
 
-    Args:
-        name: task name.
-        robot: the robot.
-        goals: number of goal poses.
-        motions: largest motion index.
-        more: task-specific entries of the observation.
-        things: scene contents besides the robot.
-        scene: scene compiled elsewhere; None: that of the robot and the things.
-        view: camera view.
+    `print(env.unwrapped.__doc__)` shows the page of a made environment: spaces, rewards, starts, arguments.
 
-    All environments share the other arguments: `print(env.unwrapped.__doc__)` is the page of a made environment.
+    Args:
+        declared: the task.
+        level: starts and obstacles, see `LEVELS`.
+        obstacles: kind of obstacles; None: those of the level.
+        control_mode: "joint_velocity" or "ee_twist".
+        reward: "sparse" or "dense".
+        render_mode: None, "rgb_array" or "human".
+        control_frequency: actions per second [Hz].
+        goal_form: whether observations are those of Gymnasium's goal environments; only of single motions.
+        end_on_success: whether a settled success ends an episode of a single motion; None: with sparse rewards that are
+            not in the goal form. Dense rewards are never negative: an early end would pay less than waiting.
     """
 
-    FACTS: TaskFacts
-    """Facts about the task, its documentation among them."""
-
-    _goal_pose: np.ndarray
-    _progress: ProgressT
-
+    __doc__ = Page(__doc__)  # type: ignore[assignment]
     metadata = METADATA
 
     def __init__(
         self,
+        declared: DeclaredTask,
         *,
-        name: str,
-        robot: Robot,
-        things: SceneSpec,
-        goals: int,
-        motions: int,
         level: str,
         obstacles: str | None,
         control_mode: str,
         reward: str,
         render_mode: str | None,
         control_frequency: int,
-        arms: tuple[str, ...] | None = None,
-        scene: CompiledScene | None = None,
-        view: View = TABLE_VIEW,
-        more: dict[str, gym.spaces.Box] | None = None,
+        goal_form: bool = False,
+        end_on_success: bool | None = None,
     ):
+        if declared.only_sparse and reward == "dense":
+            raise BadOption("reward", declared.only_sparse)
         level_named(level)
+        self.declared = declared
         self.level, self.obstacles = level, None if obstacles is None else checked_obstacles(obstacles, SLOTS)
         self.control_mode = checked_choice("control_mode", control_mode, CONTROL_MODES)
         self.reward_kind = checked_choice("reward", reward, REWARDS)
@@ -96,7 +82,8 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
             checked_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         self.render_mode = render_mode
         self.substeps = substeps_at(control_frequency)
-        self.sim = Simulation.of(scene or compiled_scene(robot, replace(things, obstacles=SLOTS), arms))
+        things = replace(declared.things, obstacles=SLOTS)
+        self.sim = Simulation.of(declared.scene or compiled_scene(declared.robot, things, declared.arms))
         self.arms = tuple(index.arm for index in self.sim.scene.arms)
         self.metadata = {**METADATA, "render_fps": control_frequency}
         entries = self.arms[0].dof if control_mode == "joint_velocity" else 6
@@ -105,36 +92,38 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         self._speed_limits = np.stack([arm.velocity_limits for arm in self.arms])
         self._action = np.zeros(self.action_space.shape or ())
         self._renderer: Renderer | None = None
-        self._view, self._steps, self._contacts, self._refused = view, 0, 0, 0
-        self._task = self._described(name, things)
-        widths, objects = self._task.gripper_width, len(self._task.objects)
+        self._steps, self._contacts, self._refused = 0, 0, 0
+        self._episode: TaskEpisode | None = None
+        description = described_scene(
+            self.sim, declared.name, declared.things, self.control_dt, self.control_mode, declared.facts.skill
+        )
+        self._task = declared.described(description)
+        declared.bind(self._world(np.random.default_rng(0)))
+        self._take_form(goal_form, end_on_success)
+
+    def _take_form(self, goal_form: bool, end_on_success: bool | None) -> None:
+        """Set up the observation space, and what only single motions have."""
+        declared, widths, objects = self.declared, self._task.gripper_width, len(self._task.objects)
+        forms.check_flags(goal_form=goal_form, end_on_success=end_on_success)
+        if goal_form and not self._form.bounds:
+            raise BadOption("goal_form", f"{declared.name} has no goals: success is only a condition")
+        # the servos respond some actions late: without the last action a learner sees only half of the state
+        last = {} if declared.form is None else {forms.LAST_ACTION: self.action_space}
+        more: Any = {**declared.more, **last}
         self.observation_space: Any = space.observation_space(
-            self.arms, widths, objects, goals, motions, SLOTS, **(more or {})
+            self.arms, widths, objects, declared.goals, declared.motions, SLOTS, **more
         )
         self.boxes = self.observation_space.spaces
-
-    def _described(self, name: str, things: SceneSpec) -> TaskDescription:
-        parts = robot_parts(self.sim.scene)
-        return TaskDescription(
-            name=name,
-            robot=self.sim.scene.robot.name,
-            arms=self.arms,
-            control_dt=self.control_dt,
-            objects=tuple(TaskObject.of(each) for each in things.objects),
-            bodies=parts.bodies,
-            table_height=TABLE_HEIGHT,
-            fixtures=parts.fixtures,
-            gripper_width=tuple(self.sim.widest_opening(k) for k in range(len(self.arms))),
-            furniture=tuple(TaskFurniture.of(each) for each in things.furniture),
-            touching=parts.touching,
-            obstacles=SLOTS,
-            control_mode=self.control_mode,
-            skill=self.FACTS.skill,
-        )
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        cls.__doc__ = Page(str(cls.__doc__))  # type: ignore[assignment]
+        if declared.too_short:
+            forms.check_long_enough(
+                declared.name, level_named(self.level).obstacles if self.obstacles is None else self.obstacles
+            )
+        self.goal_form = goal_form
+        dense = self.reward_kind == "dense" or goal_form
+        self.ends_on_success = (not dense or declared.form is None) if end_on_success is None else end_on_success
+        if goal_form and declared.form is not None:
+            self._seen_space = gym.spaces.Dict(forms.seen_in_goal_form(self.boxes))
+            self.observation_space = forms.goal_form_space(declared.form, self._seen_space)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what makes a twin, in this process or another: all but an open image or window."""
@@ -142,7 +131,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
             _ = draws.np_random  # made at its first use: each twin would make another
         return {**self.__dict__, "_renderer": None}
 
-    def __copy__(self) -> TaskEnv[ProgressT]:
+    def __copy__(self) -> TaskEnv:
         return copy.deepcopy(self)
 
     @property
@@ -155,27 +144,18 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         """Time between actions [s]."""
         return self.substeps * PHYSICS_DT
 
-    @abstractmethod
-    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
-        """Return the start of an episode, without obstacles; set `_goal_pose`, `_progress` and the task's own state.
+    @property
+    def episode(self) -> TaskEpisode:
+        """The present episode."""
+        if self._episode is None:
+            raise BadAction("there is no episode yet: call reset first")
+        return self._episode
 
-        Args:
-            options: options of `reset`, except "level" and "obstacles"; unknown keys are refused.
-            layout: name of the ranges to draw from.
-            spacious: whether obstacles will be placed, which need clearance.
-        """
-
-    @abstractmethod
-    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """Return the hand's motions that obstacles may block, in order."""
+    def _world(self, rng: np.random.Generator) -> World:
+        return World(self.sim, self.arms, self._task, self.control_dt, rng)
 
     def _ghosts(self) -> list[Ghost]:
-        """Return the shapes drawn without being simulated: the goals, if they are places of objects."""
-        return []
-
-    def _paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
-        """Return the obstacles of the paper's experiment."""
-        raise BadOption("obstacles", f"the paper shows no obstacle in {self.task.name}")
+        return [] if self._episode is None else self.declared.ghosts(self._episode)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -184,7 +164,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
 
         Args:
             seed: seed of the episode's random numbers; None: continue the random sequence.
-            options: start options, see the environment's docstring.
+            options: start options, see the environment's page.
 
         Raises:
             UnknownName: an unknown option, level or kind of obstacles.
@@ -201,21 +181,26 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
     def _started(self, options: dict[str, Any]) -> Start:
         """Return a start with its obstacles; draw another start while the obstacles do not fit."""
         level = level_named(options.pop("level", self.level))
-        wanted = level.obstacles if self.obstacles is None else self.obstacles
-        wanted = checked_obstacles(options.pop("obstacles", wanted), SLOTS)
-        self._refused = 0
+        wanted = options.pop("obstacles", level.obstacles if self.obstacles is None else self.obstacles)
+        if self.declared.too_short:
+            forms.check_long_enough(self.declared.name, wanted)
+        wanted = checked_obstacles(wanted, SLOTS)
+        self._refused, world = 0, self._world(self.np_random)
+        spacious = isinstance(wanted, str) and wanted != "none"
         for _ in range(MAX_LAYOUTS):
-            start = self._start(dict(options), level.layout, isinstance(wanted, str) and wanted != "none")
-            scheduled_obstacles = wanted if isinstance(wanted, tuple) else self._scheduled_obstacles(wanted, start)
-            if scheduled_obstacles is not None:
-                return start._replace(scheduled_obstacles=scheduled_obstacles)
+            episode = self._episode = self.declared.begin(world, dict(options), level.layout, spacious=spacious)
+            scheduled = wanted if isinstance(wanted, tuple) else self._scheduled_obstacles(wanted, world, episode)
+            if scheduled is not None:
+                return episode.start._replace(scheduled_obstacles=scheduled)
             self._refused += 1
         raise NoRoom(wanted)
 
-    def _scheduled_obstacles(self, kind: str, start: Start) -> tuple[ScheduledObstacle, ...] | None:
+    def _scheduled_obstacles(
+        self, kind: str, world: World, episode: TaskEpisode
+    ) -> tuple[ScheduledObstacle, ...] | None:
         if kind == "none":
             return ()
-        task, motions = self.task, self._placement_motions(start)
+        task, start, motions = self.task, episode.start, self.declared.placement_motions(world, episode)
         things: list[Obstacle] = []
         poses = (*start.objects, *start.furniture)
         for each, pose in zip((*task.objects, *task.furniture), poses, strict=True):
@@ -224,7 +209,7 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         stage = PlacementContext(
             motions, task.arms[0], task.bodies[0], start.joints[0], solids, things, task.table_height
         )
-        return placed(self.np_random, kind, stage, self._paper(motions) if kind == "paper" else None)
+        return placed(self.np_random, kind, stage, self.declared.paper(motions) if kind == "paper" else None)
 
     def _reached(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Return Gymnasium's step results for the current state of the simulation."""
@@ -241,12 +226,41 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
 
     def _judge(self, state: State) -> tuple[float, bool, dict[str, Any]]:
         """Return reward, terminated and info of the state just reached."""
-        progress = self._progress
+        episode, dense = self.episode, self.reward_kind == "dense"
+        progress, world = episode.progress, self._world(self.np_random)
+        self.declared.look(world, episode, state, self._steps * self.control_dt, shaped=dense)
         verdict = progress.update(state)
         if verdict.unwanted:
             progress.collision = self.sim.contact_name((verdict.low, verdict.high))
-        reward = progress.reward(state) if self.reward_kind == "dense" else float(progress.success)
-        return reward, progress.success or progress.failed, progress.info()
+        reward = progress.reward(state) if dense else float(progress.success)
+        info = progress.info()
+        if self.goal_form:
+            reward = self.compute_reward(self.achieved_goal(state), self.desired_goal(), info)
+        return reward, progress.failed or (self.ends_on_success and progress.success), info
+
+    @property
+    def _form(self) -> forms.GoalForm:
+        if self.declared.form is None:
+            raise BadOption("goal_form", f"{self.task.name} is no single motion: it has no goal form")
+        return self.declared.form
+
+    def achieved_goal(self, state: State) -> np.ndarray:
+        """Return the goal (g,) that a state has achieved, comparable to `desired_goal`."""
+        return self._form.achieved(self.episode, state)
+
+    def desired_goal(self) -> np.ndarray:
+        """Return the desired goal (g,)."""
+        return self._form.desired(self.episode)
+
+    def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any) -> Any:
+        """Return the goal form's reward, see `GoalForm.reward`.
+
+        Args:
+            achieved_goal: (g,) or (n, g) achieved goals.
+            desired_goal: desired goals of the same shape.
+            info: unused; required by Gymnasium's goal environments.
+        """
+        return self._form.reward(achieved_goal, desired_goal, dense=self.reward_kind == "dense")
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Apply an action for one control step.
@@ -254,17 +268,19 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
         Raises:
             BadAction: not an array of real numbers, of the wrong shape, or not finite.
         """
-        self._take(action)
+        space.take_action(action, self._action)
         if self.sim.obstacles.scheduled_obstacles:
-            self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self._progress.motion_index)
+            self.sim.advance_obstacles((self._steps + 1) * self.control_dt, self.episode.progress.motion_index)
         if self.control_mode == "joint_velocity":
             bad = self.sim.step(self._action, self._speed_limits, 1.0, self.substeps)
         else:
-            bad = self._step_twists()
+            bad = self._drive.step(self._action, self.substeps)
         if bad >= 0:
             raise BadAction(f"entry {bad} is not finite")
         self._steps += 1
-        return self._reached()
+        reached = self._reached()
+        self.declared.follow(self._world(self.np_random), self.episode, reached[0])
+        return reached
 
     def render(self) -> np.ndarray | None:
         """Return an image (height, width, 3) uint8 in the mode "rgb_array"; the first call opens OpenGL."""
@@ -283,44 +299,28 @@ class TaskEnv(gym.Env[Observation, np.ndarray], ABC, Generic[ProgressT]):
 
     def _opened_renderer(self) -> Renderer:
         if self._renderer is None:
-            self._renderer = Renderer(self.sim.model, self._view)
+            self._renderer = Renderer(self.sim.model, self.declared.view)
         return self._renderer
 
-    def _take(self, action: np.ndarray) -> None:
-        """Copy an action of any array type into the buffer that the compiled code reads."""
-        if type(action) is not np.ndarray or action.dtype != np.float64:
-            try:
-                action = np.asarray(action)
-            except ValueError:
-                raise BadAction("is not an array of numbers") from None
-            if action.dtype.kind not in "fiub":
-                raise BadAction(f"is not an array of real numbers, but of {action.dtype.name}")
-        if action.shape != self._action.shape:
-            raise BadAction(f"has shape {action.shape}; expected {self._action.shape}")
-        self._action[:] = action
-
-    def _step_twists(self) -> int:
-        """Step with tcp twists in world axes."""
-        finite = np.isfinite(self._action)
-        if not finite.all():
-            return int(np.argmin(finite))
-        rows = np.clip(self._action, -1.0, 1.0).reshape(len(self.arms), -1)
-        commands = np.column_stack([self._drive.commands(rows), rows[:, -1]])
-        return self.sim.step(commands.ravel(), np.ones_like(self._speed_limits), math.inf, self.substeps)
-
     def _observation(self, state: State) -> Observation:
-        return {
+        episode, declared = self.episode, self.declared
+        last = {} if declared.form is None else {forms.LAST_ACTION: np.clip(self._action, -1.0, 1.0)}
+        whole = {
             "joint_positions": state.joint_positions,
             "joint_velocities": state.joint_velocities,
             "tcp_pose": state.tcp_pose,
             "gripper_opening": state.gripper_opening,
             "object_pose": state.object_pose,
-            "goal_pose": self._goal_pose.copy(),
-            "motion_index": np.array([self._progress.motion_index]),
+            "goal_pose": episode.goals.copy(),
+            "motion_index": np.array([episode.progress.motion_index]),
             **self.sim.obstacles.observed(self._steps * self.control_dt),
-            **self._more_observed(state),
+            **declared.observed(episode),
+            **last,
         }
-
-    def _more_observed(self, state: State) -> Observation:
-        """Return the task-specific entries of the observation."""
-        return {}
+        if not self.goal_form:
+            return whole
+        return {
+            "observation": np.asarray(flatten(self._seen_space, forms.seen_in_goal_form(whole))),
+            "achieved_goal": self.achieved_goal(state),
+            "desired_goal": self.desired_goal(),
+        }

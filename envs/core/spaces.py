@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ...planner import Arm
+from ..errors import BadAction
 
 REACH = 3.0
 """Bound of world coordinates [m]; an object beyond it has long fallen off the table."""
@@ -92,3 +93,25 @@ def action_space(entries_per_arm: int, arms: int) -> spaces.Box:
         arms: number of arms.
     """
     return box(-1.0, 1.0, (arms * (entries_per_arm + 1),))
+
+
+def take_action(action: Any, into: np.ndarray) -> None:
+    """Copy an action of any array type into the buffer that the compiled code reads.
+
+    Args:
+        action: the action.
+        into: the buffer.
+
+    Raises:
+        BadAction: not an array of real numbers, or of the wrong shape.
+    """
+    if type(action) is not np.ndarray or action.dtype != np.float64:
+        try:
+            action = np.asarray(action)
+        except ValueError:
+            raise BadAction("is not an array of numbers") from None
+        if action.dtype.kind not in "fiub":
+            raise BadAction(f"is not an array of real numbers, but of {action.dtype.name}")
+    if action.shape != into.shape:
+        raise BadAction(f"has shape {action.shape}; expected {into.shape}")
+    into[:] = action

@@ -90,7 +90,8 @@ class Page:
     def __get__(self, env: Any, kind: type) -> str:
         if env is None:
             return self._text
-        return f"{env.FACTS.page.summary}\n\n{page_of(env.FACTS, env.boxes, env.arms[0].dof, len(env.arms))}"
+        facts = env.declared.facts
+        return f"{facts.page.summary}\n\n{page_of(facts, env.boxes, env.arms[0].dof, len(env.arms))}"
 
 
 def page_of(facts: TaskFacts, observation: Mapping[str, Any], joints: int, arms: int) -> str:

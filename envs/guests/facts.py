@@ -7,7 +7,7 @@ from ..facts.task_facts import TaskFacts, TaskPage
 ROBOSUITE = TaskFacts(
     "robosuite",
     "onedemo/Robosuite-v0",
-    "onedemo.envs.guests.robosuite_env:RobosuiteEnv",
+    "onedemo.envs.guests.robosuite_env:robosuite_env",
     60.0,
     TaskPage(
         summary="""\

@@ -202,16 +202,8 @@ def _is_still(velocity, limits):
 
 
 @kernel
-def judge_objects(poses, velocities, start, stays, limits):
-    """Return whether all objects are at rest, one is off the table, and one that must stay was moved.
-
-    Args:
-        poses: (n, 7) poses of the objects, x y z [m] and wxyz.
-        velocities: (n, 3) velocities of the objects [m/s].
-        start: (n, 7) poses at the start.
-        stays: (n, 2) how far [m, rad] an object may be moved; infinite: anywhere.
-        limits: see `LIMIT`.
-    """
+def _objects(poses, velocities, start, stays, limits):
+    """Return whether all objects are at rest, one is off the table, and one that must stay was moved."""
     quiet, fallen, disturbed = True, False, False
     for k in range(len(poses)):
         quiet = quiet and _is_still(velocities[k], limits)
@@ -222,20 +214,8 @@ def judge_objects(poses, velocities, start, stays, limits):
 
 
 @kernel
-def judge_goals(poses, velocities, tcp, touching, goals, rows, limits, memory, errors):
-    """Return the number of objects in place; whether the next is held, is raised, the hand is away, and one is lost.
-
-    Args:
-        poses: (n, 7) poses of the objects, x y z [m] and wxyz.
-        velocities: (n, 3) velocities of the objects [m/s].
-        tcp: (n_arms, 7) tcp poses.
-        touching: (owners, owners) contacts, see `State`.
-        goals: (g, 7) goals.
-        rows: (g, `GOAL.width`) description of the goals.
-        limits: see `LIMIT`.
-        memory: (`MEMORY.width`, n) see `MEMORY`; updated.
-        errors: (g, `MEASURE.width`) result.
-    """
+def _goals(poses, velocities, tcp, touching, goals, rows, limits, memory, errors):
+    """Return the number of objects in place; whether the next is held, is raised, the hand is away, and one is lost."""
     placed, counting, away, lost, held, raised = 0, True, True, False, False, False
     for g in range(len(goals)):
         k = int(rows[g, GOAL.thing])
@@ -280,10 +260,8 @@ def judge_state(poses, velocities, tcp, touching, goals, start, rows, stays, lim
         memory: (`MEMORY.width`, n) see `MEMORY`; updated.
         errors: (g, `MEASURE.width`) result.
     """
-    quiet, fallen, disturbed = judge_objects(poses, velocities, start, stays, limits)
-    placed, held, raised, away, lost = judge_goals(
-        poses, velocities, tcp, touching, goals, rows, limits, memory, errors
-    )
+    quiet, fallen, disturbed = _objects(poses, velocities, start, stays, limits)
+    placed, held, raised, away, lost = _goals(poses, velocities, tcp, touching, goals, rows, limits, memory, errors)
     following = placed if limits[LIMIT.in_turn] != 0.0 else -1
     unwanted, low, high = unwanted_contacts(touching, allowed, following)
     return placed, held, raised, int(quiet and away), lost, int(fallen), int(disturbed), unwanted, low, high

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,8 @@ from ...planner.control.inverse_kinematics import inverse_kinematics
 from ...planner.errors import BadOption, told_apart
 from ...planner.geometry.shapes import pack
 from ..core import spaces as space
-from ..core.environment import TaskEnv
+from ..core.declared_task import DeclaredTask, TaskEpisode, World
+from ..core.maker import EnvironmentMaker
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints
 from ..scene.beads import poured_into
@@ -21,7 +23,6 @@ from ..scene.robots import robot_named
 from ..scene.scene_objects import Beads, Glass, SceneSpec
 from ..simulation.render import View
 from ..simulation.simulation import Start
-from ..simulation.state import State
 from .facts import BIMANUAL_POUR, SOURCE, TARGET
 from .geometry import level_hand
 from .rules import PourProgress
@@ -75,111 +76,92 @@ RANGES = {
 """Ranges by layout name, see `levels`; unreachable starts are drawn anew."""
 
 
-class BimanualPourEnv(TaskEnv[PourProgress]):
-    """Pour the beads of one glass into another, each held by one arm of Baxter from the start."""
+class BimanualPouring(DeclaredTask):
+    """Pouring with two arms.
 
-    FACTS = BIMANUAL_POUR
+    Args:
+        robot: name of the robot.
+    """
 
-    def __init__(
-        self,
-        robot: str = "Baxter",
-        level: str = "L1",
-        obstacles: str | None = None,
-        control_mode: str = "joint_velocity",
-        reward: str = "sparse",
-        control_frequency: int = 50,
-        render_mode: str | None = None,
-    ):
-        kind = robot_named(robot)
-        if tuple(kind.ready) != ARMS:
+    facts, name, goals, motions, view = BIMANUAL_POUR, BIMANUAL_POUR.name, 1, 2, VIEW
+    things, arms = SceneSpec(GLASSES, (), BEADS), ARMS
+    more: Mapping[str, Any] = {"bead_fraction": space.box(0.0, 1.0, (3,))}
+
+    def __init__(self, robot: str = "Baxter"):
+        self.robot = robot_named(robot)
+        if tuple(self.robot.ready) != ARMS:
             raise BadOption("robot", f"{robot} has one arm; this task needs two: Baxter")
         for glass in GLASSES:
-            kind.check_grip(2.0 * glass.radius, f"the {glass.name}")
-        super().__init__(
-            name="bimanual_pour",
-            robot=kind,
-            things=SceneSpec(GLASSES, (), BEADS),
-            goals=1,
-            motions=2,
-            level=level,
-            obstacles=obstacles,
-            control_mode=control_mode,
-            reward=reward,
-            render_mode=render_mode,
-            control_frequency=control_frequency,
-            arms=ARMS,
-            view=VIEW,
-            more={"bead_fraction": space.box(0.0, 1.0, (3,))},
-        )
-        self._solids = pack(self.task.fixtures)
-        self._place(np.array(READY))
+            self.robot.check_grip(2.0 * glass.radius, f"the {glass.name}")
 
-    def _place(self, joints: np.ndarray) -> np.ndarray:
-        """Take over the start joints (2, dof); return the poses (2, 7) of the glasses in the hands."""
-        held = [
-            (arm.fk(q) @ tcp_from_glass(k)).vector for k, (arm, q) in enumerate(zip(self.arms, joints, strict=True))
-        ]
-        glasses = np.array(held)
-        rim = Pose.from_vector(glasses[TARGET]) @ Pose.from_position_quaternion([0, 0, 0.5 * GLASSES[TARGET].height])
-        self._goal_pose = rim.vector[None]
-        sizes = np.array([[glass.radius, glass.height] for glass in GLASSES])
-        self._progress = PourProgress(glasses, sizes, BEADS.count, self.control_dt, in_hand=True)
-        return glasses
+    def bind(self, world: World) -> None:
+        """See `DeclaredTask`."""
+        self.solids = pack(world.task.fixtures)
 
-    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+    def begin(self, world: World, options: dict[str, Any], layout: str, *, spacious: bool) -> TaskEpisode:
+        """See `DeclaredTask`."""
         check_known(options, OPTIONS)
-        joints = self._drawn(RANGES[layout])
+        joints = self._drawn(world, RANGES[layout])
         if "joint_positions" in options:
-            joints = checked_joints(options["joint_positions"], self.arms)
-            for arm, q, side in zip(self.arms, joints, ARMS, strict=True):
+            joints = checked_joints(options["joint_positions"], world.arms)
+            for arm, q, side in zip(world.arms, joints, ARMS, strict=True):
                 tilt = float(np.degrees(np.arccos(np.clip(arm.fk(q).rotation[2, 1], -1.0, 1.0))))
                 if tilt > TILT:
                     found, most = told_apart(tilt, TILT, 0)
                     reason = f"the {side} hand is {found} degrees from level; {most} are possible with a glass in it"
                     raise BadOption("joint_positions", reason)
-        glasses = self._place(joints)
+        held = [arm.fk(q) @ tcp_from_glass(k) for k, (arm, q) in enumerate(zip(world.arms, joints, strict=True))]
+        glasses, sizes = np.array([pose.vector for pose in held]), [[each.radius, each.height] for each in GLASSES]
+        rim = Pose.from_vector(glasses[TARGET]) @ Pose.from_position_quaternion([0, 0, 0.5 * GLASSES[TARGET].height])
+        progress = PourProgress(glasses, np.array(sizes), BEADS.count, world.dt, in_hand=True)
         beads = poured_into(glasses[SOURCE], GLASSES[SOURCE], BEADS)
-        return Start(joints, glasses, beads=beads, grips=np.array([2.0 * glass.radius for glass in GLASSES]))
+        start = Start(joints, glasses, beads=beads, grips=np.array([2.0 * glass.radius for glass in GLASSES]))
+        return TaskEpisode(start, rim.vector[None], progress)
 
-    def _drawn(self, ranges: BimanualPourRanges) -> np.ndarray:
+    def _drawn(self, world: World, ranges: BimanualPourRanges) -> np.ndarray:
         """Draw start joints (2, dof) by rejection, by reach alone, independent of any method."""
-        rng = self.np_random
+        rng = world.rng
         for _ in range(MAX_STARTS):
             places = np.array(PLACES) + rng.uniform(-ranges.place, ranges.place, (2, 3))
             yaws = YAWS + rng.uniform(-ranges.yaw, ranges.yaw, 2)
-            seeds = np.array(READY) + rng.uniform(-ranges.joints, ranges.joints, (2, self.arms[0].dof))
+            seeds = np.array(READY) + rng.uniform(-ranges.joints, ranges.joints, (2, world.arms[0].dof))
             if np.hypot(*(places[0] - places[1])[:2]) < APART:
                 continue
-            found = [self._reachable(k, places[k], yaws[k], seeds[k]) for k in range(2)]
+            found = [self._reachable(world, k, places[k], yaws[k], seeds[k]) for k in range(2)]
             if found[0] is not None and found[1] is not None:
                 return np.array(found)
         raise BadOption("level", "no start was found that both arms can reach")
 
-    def _reachable(self, k: int, place: np.ndarray, yaw: float, seed: np.ndarray) -> np.ndarray | None:
+    def _reachable(self, world: World, k: int, place: np.ndarray, yaw: float, seed: np.ndarray) -> np.ndarray | None:
         """Return joints (dof,) of arm k that hold its glass at a place, or None."""
-        arm = self.arms[k]
+        arm = world.arms[k]
         rise = np.array([0.0, 0.0, GRASP_HEIGHTS[k] - 0.5 * GLASSES[k].height])
         hand = level_hand(place + rise, yaw)
         q = inverse_kinematics(arm, hand, seed)
         if q is None or arm.margin(q) < MARGIN:
             return None
-        clearance = arm_clearance(arm, self._task.bodies[k], q, self._solids, range(1, arm.dof))
+        clearance = arm_clearance(arm, world.task.bodies[k], q, self.solids, range(1, arm.dof))
         return q if clearance >= CLEARANCE else None
 
-    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """Return the motion of the source to the target's initial place."""
-        hand = self.arms[0].fk(start.joints[0])
-        above = Pose.from_position_quaternion(self._goal_pose[0, :3] + [0.0, 0.0, 0.5 * GLASSES[SOURCE].height])
+    def placement_motions(self, world: World, episode: TaskEpisode) -> list[PlacementMotion]:
+        """See `DeclaredTask`: the motion of the source to the target's initial place."""
+        hand = world.arms[0].fk(episode.start.joints[0])
+        above = Pose.from_position_quaternion(episode.goals[0, :3] + [0.0, 0.0, 0.5 * GLASSES[SOURCE].height])
         turned = Pose.from_position_quaternion([0, 0, 0], hand.quaternion)
         before = above @ turned @ Pose.from_position_quaternion([0.0, 0.0, -0.1])
         return [
             PlacementMotion(hand, before, ((hand,), (before,)), GLASSES[SOURCE].shape, tcp_from_glass(SOURCE), motion=1)
         ]
 
-    def _more_observed(self, state: State) -> dict[str, np.ndarray]:
-        return {"bead_fraction": self._progress.fractions}
+    def observed(self, episode: TaskEpisode) -> dict[str, np.ndarray]:
+        """See `DeclaredTask`."""
+        assert isinstance(episode.progress, PourProgress)
+        return {"bead_fraction": episode.progress.fractions}
 
 
 def tcp_from_glass(k: int) -> Pose:
     """Return the pose of glass k in its hand: the axis between the pads, along the tcp's y."""
     return level_hand(np.array([0.0, 0.0, GRASP_HEIGHTS[k] - 0.5 * GLASSES[k].height]), 0.0).inverse()
+
+
+bimanual_pour_env = EnvironmentMaker(BimanualPouring)

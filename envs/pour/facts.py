@@ -20,13 +20,13 @@ FURTHER = {
     "goal_pose": "center of the target's rim at the start",
     "bead_fraction": "share of the beads in the source, in the target, outside both",
 }
-STANDS = "stands of source and target, from the center of their tops"
+STANDS = "stands of source and target, from the center of their tops; constant during an episode"
 POURED = "half of it the share of the beads in the target, the other half for"
 
 POUR = TaskFacts(
     "pour",
     "onedemo/Pour-v0",
-    "onedemo.envs.pour.pour_env:PourEnv",
+    "onedemo.envs.pour.pour_env:pour_env",
     40.0,
     TaskPage(
         summary="Pour the beads of one glass into another with one arm.",
@@ -69,7 +69,7 @@ yaw is drawn: a round glass has none. With `pregrasped=True` the fingers are clo
 TILT_POUR = TaskFacts(
     "tilt_pour",
     "onedemo/TiltPour-v0",
-    "onedemo.envs.pour.tilt_pour_env:TiltPourEnv",
+    "onedemo.envs.pour.tilt_pour_env:tilt_pour_env",
     7.5,
     TaskPage(
         summary="Empty the glass in the hand into the one in front of it.",
@@ -106,7 +106,7 @@ nominal place.""",
 BIMANUAL_POUR = TaskFacts(
     "bimanual_pour",
     "onedemo/BimanualPour-v0",
-    "onedemo.envs.pour.bimanual_pour_env:BimanualPourEnv",
+    "onedemo.envs.pour.bimanual_pour_env:bimanual_pour_env",
     40.0,
     TaskPage(
         summary="Pour the beads of one glass into another, each held by one arm of Baxter from the start.",

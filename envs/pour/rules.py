@@ -6,12 +6,14 @@ Compiled code judges the numbers, see `state`; `PourProgress` keeps the results.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...planner.geometry import screw
 from ...planner.jit import kernel
+from ..judge.dense_reward import tilting
 from ..judge.goal_progress import contacts
 from ..judge.judge import unwanted_contacts
 from ..judge.progress import Progress
@@ -19,6 +21,7 @@ from ..scene.scene import BEAD, FINGERS, FIRST_OBJECT, FURNITURE, OTHER_FINGERS
 from ..scene.scene_objects import TABLE_HEIGHT
 from ..simulation.state import State
 from .facts import SOURCE, TARGET
+from .geometry import TILTED
 
 ENOUGH, SPILLED = 0.9, 0.05
 """Least share of the beads in the target, and largest share outside both glasses, for success."""
@@ -179,11 +182,21 @@ class PourProgress(Progress):
         beads: number of beads.
         dt: time between states [s].
         in_hand: whether the source is in the hand from the start, off its stand.
+        dense: function of progress and state that returns the dense reward before success; None: `poured_by_arm`.
     """
 
-    def __init__(self, start: np.ndarray, sizes: np.ndarray, beads: int, dt: float, *, in_hand: bool = False):
+    def __init__(
+        self,
+        start: np.ndarray,
+        sizes: np.ndarray,
+        beads: int,
+        dt: float,
+        *,
+        in_hand: bool = False,
+        dense: Callable[[PourProgress, State], float] | None = None,
+    ):
         super().__init__(dt)
-        self.count, self._sizes = beads, sizes
+        self.count, self.sizes, self._dense = beads, sizes, dense or poured_by_arm
         self._memory, self._allowed = np.zeros(MEMORY.width), pour_contacts()
         self._memory[MEMORY.x : MEMORY.z + 1], self._memory[MEMORY.was_lifted] = start[SOURCE, :3], float(in_hand)
         self.verdict = PourVerdict(beads, 0, 0, 0, 0, 0, 0, 0, -1, -1)
@@ -228,21 +241,14 @@ class PourProgress(Progress):
         """See `Progress`."""
         poses, moving, beads = state.object_pose, state.object_velocity, state.bead_position
         self.verdict = PourVerdict(
-            *judge_beads(poses, moving, beads, state.touching, self._sizes, self._allowed, self._memory)
+            *judge_beads(poses, moving, beads, state.touching, self.sizes, self._allowed, self._memory)
         )
         self._settle(self.verdict.done == 1, self.verdict)
         return self.verdict
 
     def reward(self, state: State) -> float:
-        """See `Progress`: reached, held, carried, poured."""
-        if self.success:
-            return 1.0
-        source, target = state.object_pose
-        reach = 1.0 - math.tanh(5.0 * math.dist(state.tcp_pose[0, :3], source[:3]))
-        distance = rim_gap(source, self._sizes[SOURCE, 1], target)
-        carry = 1.0 - math.tanh(5.0 * max(0.0, distance - ARRIVED)) if self.verdict.held else 0.0
-        poured = self.verdict.target / self.count
-        return max(0.1 * reach + 0.1 * self.verdict.held + 0.2 * carry, 0.4 * (poured > 0.0)) + 0.5 * poured
+        """See `Progress`."""
+        return 1.0 if self.success else self._dense(self, state)
 
     def task_info(self) -> dict[str, Any]:
         """See `Progress`."""
@@ -253,3 +259,31 @@ class PourProgress(Progress):
             "carry_tilt": float(self._memory[MEMORY.tilt]),
             "beads_lost": int(self._memory[MEMORY.lost]),
         }
+
+
+def poured_by_arm(progress: PourProgress, state: State) -> float:
+    """Return the dense reward in [0, 1] for reaching, holding, carrying and pouring.
+
+    Args:
+        progress: of the episode.
+        state: the state.
+    """
+    (source, target), held = state.object_pose, progress.verdict.held
+    reach = 1.0 - math.tanh(5.0 * math.dist(state.tcp_pose[0, :3], source[:3]))
+    distance = rim_gap(source, progress.sizes[SOURCE, 1], target)
+    carry = 1.0 - math.tanh(5.0 * max(0.0, distance - ARRIVED)) if held else 0.0
+    poured = progress.verdict.target / progress.count
+    return max(0.1 * reach + 0.1 * held + 0.2 * carry, 0.4 * (poured > 0.0)) + 0.5 * poured
+
+
+def tilted_over(progress: PourProgress, state: State) -> float:
+    """Return the dense reward in [0, 1] for tilting a source in the hand over the target, see `dense_reward.tilting`.
+
+    Args:
+        progress: of the episode.
+        state: the state.
+    """
+    source, target = state.object_pose
+    distance = max(0.0, float(rim_gap(source, progress.sizes[SOURCE, 1], target)) - progress.sizes[TARGET, 0])
+    tilt = min(1.0, float(tilt_of(source)) / TILTED)
+    return float(tilting(distance, tilt, progress.verdict.held, progress.verdict.target / progress.count))

@@ -7,7 +7,7 @@ from ..facts.task_facts import SegmentPlayback, TaskFacts, TaskPage
 INSERTED = {"insertion_offset": "position_error", "insertion_angle": "angle_error"}
 NUMBERS = "`books_placed`, `position_error` (n,) [m], `angle_error` (n,) [rad], `clutter_pushed_over`"
 OBJECTS = "the books, then the clutter; a book's x points away from its spine, z along it"
-FURNITURE = "cupboard, stand and the stand's foot"
+FURNITURE = "cupboard, stand and the stand's foot; constant during an episode"
 SHELF = '"upper" or "lower"; the demonstration was given in the lower one'
 PLACES = {
     "cupboard_pose": "(7,)",
@@ -18,7 +18,7 @@ PLACES = {
 SHELVE = TaskFacts(
     "shelve",
     "onedemo/Shelve-v0",
-    "onedemo.envs.shelve.shelve_env:ShelveEnv",
+    "onedemo.envs.shelve.shelve_env:shelve_env",
     90.0,
     TaskPage(
         summary="Shelve three books in the upper shelf of a cluttered cupboard, with one arm.",
@@ -73,7 +73,7 @@ the stand, start joints by up to 0.05 rad; L2 up to 8 cm, 10 cm lower to 5 cm hi
 INSERT_ONE = TaskFacts(
     "insert_one",
     "onedemo/InsertOne-v0",
-    "onedemo.envs.shelve.insert_one_env:InsertOneEnv",
+    "onedemo.envs.shelve.insert_one_env:insert_one_env",
     7.5,
     TaskPage(
         summary="Insert the book in the hand into its slot.",

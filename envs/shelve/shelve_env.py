@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,9 @@ import numpy as np
 from ...planner import Box, Obstacle, Pose
 from ...planner.errors import BadOption
 from ...planner.geometry.shapes import pack
-from ..core.environment import MAX_LAYOUTS, Observation, TaskEnv
+from ..core.declared_task import DeclaredTask, TaskEpisode, World
+from ..core.environment import MAX_LAYOUTS
+from ..core.maker import EnvironmentMaker
 from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_choice, checked_joints
 from ..core.spaces import pose_box
@@ -19,7 +23,6 @@ from ..scene.robots import places_of, robot_named
 from ..scene.scene_objects import SceneSpec
 from ..simulation.render import Ghost, View
 from ..simulation.simulation import Start
-from ..simulation.state import State
 from .facts import SHELVE
 from .layout import MOST_BOOKS, RANGES, ShelfLayout, shelf_layout
 from .options import OPTIONS, given_layout
@@ -43,102 +46,81 @@ PAPER_SIZES = (0.06, 0.09)
 """Sizes of the obstacles that appear while the second and the third book are placed [m]."""
 
 
-class ShelveEnv(TaskEnv[GoalProgress]):
-    """Shelve three books in the upper shelf of a cluttered cupboard, with one arm."""
+@dataclass
+class Handing:
+    """Books handed over, and where.
 
-    FACTS = SHELVE
+    Attributes:
+        layout: the layout of the episode.
+        handed: number of books handed over.
+    """
 
-    def __init__(
-        self,
-        robot: str = "Panda",
-        n_books: int = 3,
-        shelf: str = "upper",
-        level: str = "L1",
-        obstacles: str | None = None,
-        control_mode: str = "joint_velocity",
-        reward: str = "sparse",
-        control_frequency: int = 50,
-        render_mode: str | None = None,
-    ):
+    layout: ShelfLayout
+    handed: int = 1
+
+
+class Shelving(DeclaredTask):
+    """Shelving books.
+
+    Args:
+        robot: name of the robot.
+        n_books: number of books.
+        shelf: "upper" or "lower".
+    """
+
+    facts, name, view = SHELVE, SHELVE.name, VIEW
+
+    def __init__(self, robot: str = "Panda", n_books: int = 3, shelf: str = "upper"):
         if isinstance(n_books, bool) or not isinstance(n_books, int) or not 1 <= n_books <= MOST_BOOKS:
             raise BadOption("n_books", f"{n_books!r} is not a whole number from 1 to {MOST_BOOKS}")
         self.n_books, self.shelf = n_books, checked_choice("shelf", shelf, tuple(SHELVES))
-        objects, furniture = books(n_books), (cupboard(), *stand())
-        kind = robot_named(robot)
-        self._places = places_of(SHELF_PLACES, kind, "shelve")
-        kind.check_grip(BOOK_SIZE[1], "a book")
-        super().__init__(
-            name="shelve",
-            robot=kind,
-            things=SceneSpec(objects, furniture),
-            goals=n_books,
-            motions=2 * n_books,
-            level=level,
-            obstacles=obstacles,
-            control_mode=control_mode,
-            reward=reward,
-            render_mode=render_mode,
-            control_frequency=control_frequency,
-            view=VIEW,
-            more={"furniture_pose": pose_box(len(furniture))},
-        )
-        self._ready, self._rules = np.array([self._places.ready]), shelve_rules(n_books)
-        self._drawn = shelf_layout(np.random.default_rng(0), RANGES["L0"], self._places, n_books, self._ready.shape)
-        self._take_layout(self._drawn)
+        furniture = (cupboard(), *stand())
+        self.things, self.robot = SceneSpec(books(n_books), furniture), robot_named(robot)
+        self.places = places_of(SHELF_PLACES, self.robot, "shelve")
+        self.robot.check_grip(BOOK_SIZE[1], "a book")
+        self.goals, self.motions, self.rules = n_books, 2 * n_books, shelve_rules(n_books)
+        self.more: Mapping[str, Any] = {"furniture_pose": pose_box(len(furniture))}
+        self.ready = np.array([self.places.ready])
 
-    def _take_layout(self, drawn: ShelfLayout) -> None:
-        self._drawn, self._goal_pose = drawn, drawn.goals(self.shelf)
-        self._furniture = drawn.furniture()
-        self._handed = 1
-        self._progress = GoalProgress(self._rules, self._goal_pose, drawn.objects(), self.control_dt)
-
-    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+    def begin(self, world: World, options: dict[str, Any], layout: str, *, spacious: bool) -> TaskEpisode:
+        """See `DeclaredTask`."""
         check_known(options, OPTIONS)
-        drawn, joints = self._drawn_clear(options, layout)
-        self._take_layout(drawn)
-        return Start(joints, drawn.objects(), self._furniture)
+        drawn, joints = self._drawn_clear(world, options, layout)
+        goals, objects, furniture = drawn.goals(self.shelf), drawn.objects(), drawn.furniture()
+        progress = GoalProgress(self.rules, goals, objects, world.dt)
+        start = Start(joints, objects, furniture)
+        return TaskEpisode(start, goals, progress, {"furniture_pose": furniture}, Handing(drawn))
 
-    def _drawn_clear(self, options: dict[str, Any], layout: str) -> tuple[ShelfLayout, np.ndarray]:
+    def _drawn_clear(self, world: World, options: dict[str, Any], layout: str) -> tuple[ShelfLayout, np.ndarray]:
         """Draw a layout, and start joints at which the hand is clear of the first book."""
-        lower, upper = [arm.lower for arm in self.arms], [arm.upper for arm in self.arms]
+        lower, upper = [arm.lower for arm in world.arms], [arm.upper for arm in world.arms]
         for _ in range(MAX_LAYOUTS):
-            drawn = shelf_layout(self.np_random, RANGES[layout], self._places, self.n_books, self._ready.shape)
-            drawn = given_layout(drawn, options, self._places)
+            drawn = shelf_layout(world.rng, RANGES[layout], self.places, self.n_books, self.ready.shape)
+            drawn = given_layout(drawn, options, self.places)
             if "joint_positions" in options:
-                return drawn, checked_joints(options["joint_positions"], self.arms)
-            joints = np.clip(self._ready + drawn.joints, lower, upper)
-            if self._is_clear(drawn.handed(0), joints, START_CLEARANCE):
+                return drawn, checked_joints(options["joint_positions"], world.arms)
+            joints = np.clip(self.ready + drawn.joints, lower, upper)
+            if _is_clear(world, drawn.handed(0), joints, START_CLEARANCE):
                 return drawn, joints
         raise BadOption("stand_pose", "the robot would start at the book; give joint_positions that are away from it")
 
-    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Apply an action for one control step; afterwards hand over the next book if it is due."""
-        reached = super().step(action)
-        k = self._handed
-        if (
-            k < self.n_books
-            and self._progress.placed == k
-            and self._is_clear(self._drawn.handed(k), reached[0]["joint_positions"], CLEAR)
-        ):
-            pose = self._drawn.handed(k).vector
-            self.sim.put(k, pose)
-            hand_over(self._progress, k, pose)
-            self._handed += 1
-        return reached
+    def follow(self, world: World, episode: TaskEpisode, observation: dict[str, np.ndarray]) -> None:
+        """See `DeclaredTask`: hand over the next book if it is due."""
+        handing, progress = episode.layout, episode.progress
+        assert isinstance(handing, Handing) and isinstance(progress, GoalProgress)
+        k = handing.handed
+        if k < self.n_books and progress.placed == k:
+            place = handing.layout.handed(k)
+            if _is_clear(world, place, observation["joint_positions"], CLEAR):
+                world.sim.put(k, place.vector)
+                hand_over(progress, k, place.vector)
+                handing.handed += 1
 
-    def _is_clear(self, place: Pose, joints: np.ndarray, clearance: float) -> bool:
-        """Return whether the whole robot, at joints (n_arms, dof), keeps a clearance [m] from a book's place."""
-        book = pack([Obstacle(Box(BOOK_SIZE), place)])
-        return all(
-            arm_clearance(arm, body, q, book) >= clearance
-            for arm, body, q in zip(self.arms, self._task.bodies, joints, strict=True)
-        )
-
-    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """Return the carries: from above the stand to in front of the slot."""
+    def placement_motions(self, world: World, episode: TaskEpisode) -> list[PlacementMotion]:
+        """See `DeclaredTask`: the carries: from above the stand to in front of the slot."""
         motions = []
-        for k, goal in enumerate(self._goal_pose):
-            grasp, release = self._drawn.handed(k) @ GRASP, Pose.from_vector(goal) @ GRASP
+        for k, goal in enumerate(episode.goals):
+            grasp, release = episode.layout.layout.handed(k) @ GRASP, Pose.from_vector(goal) @ GRASP
             up = Pose.from_position_quaternion([0.0, 0.0, LIFT])
             back = [release @ Pose.from_position_quaternion([0.0, 0.0, -part * INSERTION_DEPTH]) for part in (1.0, 0.5)]
             keys = tuple((pose,) for pose in (grasp, up @ grasp, *back, release))
@@ -146,13 +128,24 @@ class ShelveEnv(TaskEnv[GoalProgress]):
             motions.append(PlacementMotion(up @ grasp, back[0], keys, *held, aside=SPREAD, above=SPREAD, straight=3))
         return motions
 
-    def _paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
+    def paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
         """Return two obstacles of different size: one appears with the last but one book, one with the last."""
         last = len(motions) - 1
         return [ObstacleRequest("appear", max(0, last - 1 + k), size) for k, size in enumerate(PAPER_SIZES)]
 
-    def _ghosts(self) -> list[Ghost]:
-        return [Ghost(pose, Box(BOOK_SIZE)) for pose in self._goal_pose[self._progress.placed :]]
+    def ghosts(self, episode: TaskEpisode) -> list[Ghost]:
+        """See `DeclaredTask`."""
+        assert isinstance(episode.progress, GoalProgress)
+        return [Ghost(pose, Box(BOOK_SIZE)) for pose in episode.goals[episode.progress.placed :]]
 
-    def _more_observed(self, state: State) -> Observation:
-        return {"furniture_pose": self._furniture.copy()}
+
+def _is_clear(world: World, place: Pose, joints: np.ndarray, clearance: float) -> bool:
+    """Return whether the whole robot, at joints (n_arms, dof), keeps a clearance [m] from a book's place."""
+    book = pack([Obstacle(Box(BOOK_SIZE), place)])
+    return all(
+        arm_clearance(arm, body, q, book) >= clearance
+        for arm, body, q in zip(world.arms, world.task.bodies, joints, strict=True)
+    )
+
+
+shelve_env = EnvironmentMaker(Shelving)

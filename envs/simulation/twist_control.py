@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...planner.control.linear import backward_solve, cholesky, forward_solve, gram
@@ -61,6 +63,20 @@ class TwistDrive:
             mine = self._inertia, index.qvel, self._torques[k]
             _followed(self._wanted, *mine, self._dt, self._speeds[k], self._changes[k], rates[k])
         return rates
+
+    def step(self, action: np.ndarray, substeps: int) -> int:
+        """Step the simulation with tcp twists in world axes; return the index of an entry that is not finite, or -1.
+
+        Args:
+            action: per arm a twist, as fractions of the largest one, and the gripper's entry.
+            substeps: number of steps of the physics.
+        """
+        finite = np.isfinite(action)
+        if not finite.all():
+            return int(np.argmin(finite))
+        rows = np.clip(action, -1.0, 1.0).reshape(len(self._speeds), -1)
+        commands = np.column_stack([self.commands(rows), rows[:, -1]])
+        return self._sim.step(commands.ravel(), np.ones_like(self._speeds), math.inf, substeps)
 
 
 # compiled not only for speed: the last digit of NumPy's linear algebra depends on the number of threads

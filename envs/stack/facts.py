@@ -11,7 +11,7 @@ POSES = "(n, 7); a block in the hand is held there"
 STACK = TaskFacts(
     "stack",
     "onedemo/Stack-v0",
-    "onedemo.envs.stack.stack_env:StackEnv",
+    "onedemo.envs.stack.stack_env:stack_env",
     60.0,
     TaskPage(
         summary="Stack wooden blocks at a given place, in order, with one arm.",
@@ -42,7 +42,7 @@ base place keep to a robot's own reach, `ROBOTS[robot].reach`, where it differs.
 REACH = TaskFacts(
     "reach",
     "onedemo/Reach-v0",
-    "onedemo.envs.stack.reach_env:ReachEnv",
+    "onedemo.envs.stack.reach_env:reach_env",
     7.5,
     TaskPage(
         summary="Bring the open hand above a block, ready to grasp it.",
@@ -75,7 +75,7 @@ rad; L2 up to 20 cm, 120 degrees and 0.15 rad.""",
 PLACE_ONE = TaskFacts(
     "place_one",
     "onedemo/PlaceOne-v0",
-    "onedemo.envs.stack.place_one_env:PlaceOneEnv",
+    "onedemo.envs.stack.place_one_env:place_one_env",
     7.5,
     TaskPage(
         summary="Put the block in the hand at its goal, on the table or on another block.",

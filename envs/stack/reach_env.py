@@ -8,10 +8,11 @@ import numpy as np
 
 from ...planner import Box, Pose, Sphere
 from ...planner.robot.kinematics import CHAIN
-from ..core import spaces as space
+from ..core.declared_task import DeclaredTask, TaskEpisode, World
+from ..core.goal_form import POSE_BOUNDS, Agreement, GoalForm
+from ..core.maker import SINGLE_MOTION, EnvironmentMaker
 from ..core.placement_context import PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
-from ..core.single_motion import FREQUENCY, Agreement, SingleMotionEnv
 from ..judge.dense_reward import closeness, gaps
 from ..scene.robots import robot_named
 from ..scene.scene_objects import FreeBody, SceneSpec
@@ -29,81 +30,65 @@ HEIGHT = 0.08
 """Height of the hand's goal above the block's center [m]: the fingertips are clear of the block."""
 
 
-class ReachEnv(SingleMotionEnv[ReachProgress]):
-    """Bring the open hand above a block, ready to grasp it."""
+class Reaching(DeclaredTask):
+    """Reaching for a block.
 
-    FACTS = REACH
-    GOAL_BOUNDS = (*(space.REACH,) * 3, 1.0, 1.0, 1.0, 1.0)
+    Args:
+        robot: name of the robot.
+        arm: name of the arm at work; None: the robot's default arm.
+    """
 
-    def __init__(
-        self,
-        robot: str = "Panda",
-        level: str = "L1",
-        obstacles: str | None = None,
-        control_mode: str = "ee_twist",
-        reward: str = "dense",
-        control_frequency: int = FREQUENCY,
-        goal_form: bool = False,
-        end_on_success: bool | None = None,
-        render_mode: str | None = None,
-        arm: str | None = None,
-    ):
-        kind = robot_named(robot)
-        super().__init__(
-            name="reach",
-            robot=kind,
-            things=SceneSpec((FreeBody("block0", Box(BLOCK_SIZE), "WoodLight"),)),
-            goals=1,
-            motions=1,
-            level=level,
-            obstacles=obstacles,
-            control_mode=control_mode,
-            reward=reward,
-            render_mode=render_mode,
-            control_frequency=control_frequency,
-            arms=kind.checked_arms(arm),
-        )
-        self._reach = kind.reach
-        self._goal_pose = np.zeros((1, 7))
-        self._take_form("reach", goal_form, end_on_success)
+    facts, name, goals, motions = REACH, REACH.name, 1, 1
 
-    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+    def __init__(self, robot: str = "Panda", arm: str | None = None):
+        self.robot = robot_named(robot)
+        self.things = SceneSpec((FreeBody("block0", Box(BLOCK_SIZE), "WoodLight"),))
+        self.arms = self.robot.checked_arms(arm)
+        self.form = GoalForm(POSE_BOUNDS, _achieved, _desired, _agreement)
+
+    def begin(self, world: World, options: dict[str, Any], layout: str, *, spacious: bool) -> TaskEpisode:
+        """See `DeclaredTask`."""
         check_known(options, OPTIONS)
-        home, axis = self.sim.scene.home, self.arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
+        home, arm = world.sim.scene.home, world.arms[0]
+        axis = arm.chain[0, CHAIN.offset : CHAIN.offset + 2]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
-        drawn = stack_layout(self.np_random, RANGES[layout], 1, axis, home.shape, gap, self._reach)
+        drawn = stack_layout(world.rng, RANGES[layout], 1, axis, home.shape, gap, self.robot.reach)
         poses, base = block_poses(drawn)
         if "object_poses" in options:
             poses = checked_poses("object_poses", options["object_poses"], 1)
         check_places(poses, base)
-        joints = np.clip(home + drawn.joints, self.arms[0].lower, self.arms[0].upper)
+        joints = np.clip(home + drawn.joints, arm.lower, arm.upper)
         if "joint_positions" in options:
-            joints = checked_joints(options["joint_positions"], self.arms)
+            joints = checked_joints(options["joint_positions"], world.arms)
         goals = [above(grasp, HEIGHT) for grasp in block_grasps(poses[0])]
-        self._goal_pose = goals[0].vector[None]
-        self._progress = ReachProgress(np.array([goal.dq for goal in goals]), self.control_dt)
-        return Start(joints, poses)
+        progress = ReachProgress(np.array([goal.dq for goal in goals]), world.dt)
+        return TaskEpisode(Start(joints, poses), goals[0].vector[None], progress)
 
-    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """Return the motion from the start to above the block."""
-        goals = tuple(above(grasp, HEIGHT) for grasp in block_grasps(start.objects[0]))
-        fingertip = Sphere(0.005)
-        return [
-            PlacementMotion(self.arms[0].fk(start.joints[0]), goals[0], (goals,), fingertip, Pose.identity(), motion=0)
-        ]
+    def placement_motions(self, world: World, episode: TaskEpisode) -> list[PlacementMotion]:
+        """See `DeclaredTask`: the motion from the start to above the block."""
+        goals = tuple(above(grasp, HEIGHT) for grasp in block_grasps(episode.start.objects[0]))
+        fingertip, home = Sphere(0.005), world.arms[0].fk(episode.start.joints[0])
+        return [PlacementMotion(home, goals[0], (goals,), fingertip, Pose.identity(), motion=0)]
 
-    def _ghosts(self) -> list[Ghost]:
-        return [Ghost(pose, Sphere(0.012)) for pose in self._goal_pose]
+    def ghosts(self, episode: TaskEpisode) -> list[Ghost]:
+        """See `DeclaredTask`."""
+        return [Ghost(pose, Sphere(0.012)) for pose in episode.goals]
 
-    def achieved_goal(self, state: State) -> np.ndarray:
-        """See `SingleMotionEnv`: (7,) pose of the tcp."""
-        return state.tcp_pose[0].copy()
 
-    def desired_goal(self) -> np.ndarray:
-        """See `SingleMotionEnv`: (7,) goal pose of the tcp."""
-        return self._goal_pose[0].copy()
+def _achieved(episode: TaskEpisode, state: State) -> np.ndarray:
+    """Return (7,) the pose of the tcp."""
+    return state.tcp_pose[0].copy()
 
-    def agreement(self, achieved: np.ndarray, desired: np.ndarray) -> Agreement:
-        """See `SingleMotionEnv`: poses of the tcp up to half turns of the hand."""
-        distance, angle = gaps(achieved, desired, half_turns=True)
-        return Agreement(closeness(distance, angle), (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE))
+
+def _desired(episode: TaskEpisode) -> np.ndarray:
+    """Return (7,) the goal pose of the tcp."""
+    return episode.goals[0].copy()
+
+
+def _agreement(achieved: np.ndarray, desired: np.ndarray) -> Agreement:
+    """Return how well poses of the tcp agree, up to half turns of the hand."""
+    distance, angle = gaps(achieved, desired, half_turns=True)
+    return Agreement(closeness(distance, angle), (distance <= MAX_OFFSET) & (angle <= MAX_ANGLE))
+
+
+reach_env = EnvironmentMaker(Reaching, **SINGLE_MOTION)

@@ -9,7 +9,8 @@ import numpy as np
 from ...planner import Box, Pose
 from ...planner.errors import BadOption
 from ...planner.robot.kinematics import CHAIN
-from ..core.environment import TaskEnv
+from ..core.declared_task import DeclaredTask, TaskEpisode, World
+from ..core.maker import EnvironmentMaker
 from ..core.placement_context import ObstacleRequest, PlacementMotion
 from ..core.reset_options import check_known, checked_joints, checked_poses
 from ..judge.goal_progress import GoalProgress
@@ -32,69 +33,48 @@ PAPER_SPEED = 0.1
 """Peak speed of the obstacle that swings in front of the last block [m/s]."""
 
 
-class StackEnv(TaskEnv[GoalProgress]):
-    """Stack wooden blocks at a given place, in order, with one arm."""
+class Stacking(DeclaredTask):
+    """Stacking blocks.
 
-    FACTS = STACK
+    Args:
+        robot: name of the robot.
+        n_blocks: number of blocks.
+        arm: name of the arm at work; None: the robot's default arm.
+    """
 
-    def __init__(
-        self,
-        robot: str = "Panda",
-        n_blocks: int = 3,
-        level: str = "L1",
-        obstacles: str | None = None,
-        control_mode: str = "joint_velocity",
-        reward: str = "sparse",
-        control_frequency: int = 50,
-        render_mode: str | None = None,
-        arm: str | None = None,
-    ):
+    facts, name = STACK, STACK.name
+
+    def __init__(self, robot: str = "Panda", n_blocks: int = 3, arm: str | None = None):
         if isinstance(n_blocks, bool) or not isinstance(n_blocks, int) or not 1 <= n_blocks <= 6:
             raise BadOption("n_blocks", f"{n_blocks!r} is not a whole number from 1 to 6")
-        kind = robot_named(robot)
-        kind.check_grip(BLOCK, "a block")
+        self.robot = robot_named(robot)
+        self.robot.check_grip(BLOCK, "a block")
         blocks = tuple(FreeBody(f"block{k}", Box(BLOCK_SIZE), TEXTURES[k]) for k in range(n_blocks))
-        super().__init__(
-            name="stack",
-            robot=kind,
-            things=SceneSpec(blocks),
-            goals=n_blocks,
-            motions=2 * n_blocks,
-            level=level,
-            obstacles=obstacles,
-            control_mode=control_mode,
-            reward=reward,
-            render_mode=render_mode,
-            control_frequency=control_frequency,
-            arms=kind.checked_arms(arm),
-        )
-        self.n_blocks, self._reach = n_blocks, kind.reach
-        self._goal_pose = np.zeros((n_blocks, 7))
-        self._rules = stack_rules(n_blocks)
-        self._progress = GoalProgress(self._rules, self._goal_pose, self._goal_pose, self.control_dt)
+        self.things, self.goals, self.motions = SceneSpec(blocks), n_blocks, 2 * n_blocks
+        self.arms, self.n_blocks, self.rules = self.robot.checked_arms(arm), n_blocks, stack_rules(n_blocks)
 
-    def _start(self, options: dict[str, Any], layout: str, spacious: bool) -> Start:
+    def begin(self, world: World, options: dict[str, Any], layout: str, *, spacious: bool) -> TaskEpisode:
+        """See `DeclaredTask`."""
         check_known(options, OPTIONS)
-        home = self.sim.scene.home
-        axis = self.arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
+        home, arms = world.sim.scene.home, world.arms
+        axis = arms[0].chain[0, CHAIN.offset : CHAIN.offset + 2]
         gap = LONG_GAP if spacious and RANGES[layout].block else BASE_GAP
-        drawn = stack_layout(self.np_random, RANGES[layout], self.n_blocks, axis, home.shape, gap, self._reach)
+        drawn = stack_layout(world.rng, RANGES[layout], self.n_blocks, axis, home.shape, gap, self.robot.reach)
         poses, base = block_poses(drawn)
         if "object_poses" in options:
             poses = checked_poses("object_poses", options["object_poses"], self.n_blocks)
         if "base_pose" in options:
             base = checked_poses("base_pose", [options["base_pose"]], 1)[0]
         check_places(poses, base)
-        joints = np.clip(home + drawn.joints, [a.lower for a in self.arms], [a.upper for a in self.arms])
+        joints = np.clip(home + drawn.joints, [a.lower for a in arms], [a.upper for a in arms])
         if "joint_positions" in options:
-            joints = checked_joints(options["joint_positions"], self.arms)
-        self._goal_pose = np.repeat(base[None], self.n_blocks, axis=0)
-        self._goal_pose[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
-        self._progress = GoalProgress(self._rules, self._goal_pose, poses, self.control_dt)
-        return Start(joints, poses)
+            joints = checked_joints(options["joint_positions"], arms)
+        goals = np.repeat(base[None], self.n_blocks, axis=0)
+        goals[:, 2] += BLOCK_SIZE[2] * np.arange(self.n_blocks)
+        return TaskEpisode(Start(joints, poses), goals, GoalProgress(self.rules, goals, poses, world.dt))
 
-    def _placement_motions(self, start: Start) -> list[PlacementMotion]:
-        """Return the carries: from above a block to above its goal."""
+    def placement_motions(self, world: World, episode: TaskEpisode) -> list[PlacementMotion]:
+        """See `DeclaredTask`: the carries: from above a block to above its goal."""
         return [
             PlacementMotion(
                 start=above(block_grasps(block)[0], RAISED),
@@ -106,12 +86,16 @@ class StackEnv(TaskEnv[GoalProgress]):
                 tcp_from_object=block_grasps(block)[0].inverse() @ Pose.from_vector(block),
                 motion=2 * k + 1,
             )
-            for k, (block, goal) in enumerate(zip(start.objects, self._goal_pose, strict=True))
+            for k, (block, goal) in enumerate(zip(episode.start.objects, episode.goals, strict=True))
         ]
 
-    def _paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
+    def paper(self, motions: list[PlacementMotion]) -> list[ObstacleRequest]:
         """Return an obstacle that swings in front of the last block."""
         return [ObstacleRequest("moving", len(motions) - 1, PAPER_SPEED)]
 
-    def _ghosts(self) -> list[Ghost]:
-        return [Ghost(pose, Box(BLOCK_SIZE)) for pose in self._goal_pose]
+    def ghosts(self, episode: TaskEpisode) -> list[Ghost]:
+        """See `DeclaredTask`."""
+        return [Ghost(pose, Box(BLOCK_SIZE)) for pose in episode.goals]
+
+
+stack_env = EnvironmentMaker(Stacking)

@@ -19,6 +19,7 @@ mean over the goals: up to 0.75 for bringing the object there, from 0.75 to 1 fo
 of success""",
     start="L0 the nominal layout; L1 and L2 things and goals moved as the task's ranges say.",
     ends="when an object has fallen off the table, or one of the task's conditions of failure holds",
+    observed={"furniture_pose": "poses of the fixtures; constant during an episode"},
     numbers="`placed`, `position_error` (g,) [m], `angle_error` (g,) [rad], and the task's own numbers",
     options={"object_poses": "(n, 7)"},
     goals="""\
@@ -26,7 +27,7 @@ of success""",
 goal form)""",
     blocked="the way of the objects",
 )
-OWN = TaskFacts("", "", "onedemo.envs.tasks.task_env:DeclaredEnv", 60.0, PAGE)
+OWN = TaskFacts("", "", "onedemo.envs.tasks.task_env:declared_env", 60.0, PAGE)
 """Facts about every task of a user's own; its name, id and time limit are known once its module is imported."""
 
 

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.envs.judge.dense_reward import closeness, gaps, placing, tilting, turned_by
-from onedemo.envs.stack.place_one_env import PlaceProgress
+from onedemo.envs.judge.goal_progress import GoalProgress
+from onedemo.envs.stack.rules import stack_rules
 from onedemo.planner.errors import BadOption, UnknownName
 from onedemo.planner.geometry.pose import Pose
 
@@ -301,9 +302,9 @@ def test_a_block_lifted_from_the_start_that_stands_elsewhere_was_dropped():
     goals = np.array([[0.1, 0.0, 0.825, 1.0, 0.0, 0.0, 0.0]])
     start = np.array([[-0.2, 0.0, 0.825, 1.0, 0.0, 0.0, 0.0]])
     state = SimpleNamespace(
-        object_pose=start, object_velocity=np.zeros((1, 3)), tcp_pose=start + 1.0, touching=np.zeros((6, 6))
+        object_pose=start, object_velocity=np.zeros((1, 3)), tcp_pose=start + 1.0, touching=np.zeros((9, 9))
     )
     for in_hand, reason in ((True, "dropped"), (False, "")):
-        progress = PlaceProgress(goals, start, 0.05, in_hand=in_hand)
+        progress = GoalProgress(stack_rules(1), goals, start, 0.05, in_hand=0 if in_hand else None)
         progress.update(state)
         assert progress.failure == reason

@@ -44,7 +44,7 @@ def put(env, poses):
 
 def shelved(env, moved=(0.0, 0.0, 0.0), turned=0.0, axis=(0.0, 0.0, 1.0), books=(0, 1, 2)):
     """Poses of books in their slots, the last of them moved and turned in the cupboard's frame."""
-    poses = {k: env._goal_pose[k].copy() for k in books}
+    poses = {k: env.episode.goals[k].copy() for k in books}
     half = np.sin(turned / 2) * np.array(axis)
     off = Pose.from_position_quaternion(moved, [np.cos(turned / 2), *half])
     poses[books[-1]] = (Pose.from_vector(poses[books[-1]]) @ off).vector
@@ -108,9 +108,9 @@ def test_the_wrong_shelf_does_not_count(env):
 def test_a_clutter_book_pushed_over_is_no_success(env, change, over):
     env.reset(seed=0)
     state = env.sim.read()
-    progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
+    progress = GoalProgress(env.declared.rules, env.episode.goals, state.object_pose, env.control_dt)
     poses = state.object_pose.copy()
-    poses[:N] = env._goal_pose
+    poses[:N] = env.episode.goals
     half = 0.5 * np.deg2rad(change[1])
     fallen = Pose.from_vector(poses[4]) @ Pose.from_position_quaternion(
         [change[0], 0, 0], [np.cos(half), np.sin(half), 0, 0]
@@ -126,11 +126,11 @@ def test_a_book_in_the_hand_or_moving_or_beside_the_hand_does_not_count(env):
     env.reset(seed=0)
     state = env.sim.read()
     poses = state.object_pose.copy()
-    poses[:N] = env._goal_pose
+    poses[:N] = env.episode.goals
     quiet = state._replace(object_pose=poses, touching=np.zeros_like(state.touching))
 
     def succeeds(**changes):
-        progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
+        progress = GoalProgress(env.declared.rules, env.episode.goals, state.object_pose, env.control_dt)
         for _ in range(30):
             progress.update(quiet._replace(**changes))
         return progress.success
@@ -148,7 +148,7 @@ def test_a_book_in_the_hand_or_moving_or_beside_the_hand_does_not_count(env):
 def test_a_lifted_book_that_rests_elsewhere_was_dropped(env):
     env.reset(seed=0)
     state = env.sim.read()
-    progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
+    progress = GoalProgress(env.declared.rules, env.episode.goals, state.object_pose, env.control_dt)
 
     def failure(height, gripped):
         poses, touching = state.object_pose.copy(), np.zeros_like(state.touching)
@@ -196,7 +196,7 @@ def test_wanted_contacts():
 
 
 def test_the_next_book_is_handed_over_when_the_last_is_shelved_and_the_robot_is_away(env):
-    near = env._drawn.handed(0) @ GRASP @ Pose.from_position_quaternion([0.0, 0.0, -0.09])
+    near = env.episode.layout.layout.handed(0) @ GRASP @ Pose.from_position_quaternion([0.0, 0.0, -0.09])
     joints = inverse_kinematics(env.arms[0], near, PANDAS.ready)
     env.reset(seed=0, options={"joint_positions": joints})
     pile = env.step(IDLE)[0]["object_pose"][1]
@@ -211,7 +211,7 @@ def test_the_next_book_is_handed_over_when_the_last_is_shelved_and_the_robot_is_
     assert heights[0] < 0.9 and heights[-1] > 1.1
     for _ in range(30):
         after, *_, info = env.step(IDLE)
-    np.testing.assert_allclose(after["object_pose"][1], env._drawn.handed(1).vector, atol=2e-3)
+    np.testing.assert_allclose(after["object_pose"][1], env.episode.layout.layout.handed(1).vector, atol=2e-3)
     assert info["safe"] and info["books_placed"] == 1
     assert after["object_pose"][2, 2] < 0.9, "one at a time"
 
@@ -288,10 +288,10 @@ def test_given_books_lie_where_they_are_wanted_and_stay_there(env):
     off = (stand.inverse() @ first).position - handed(np.zeros(3)).position
     np.testing.assert_allclose(off, [0.015, -0.03, 0.0], atol=1e-9)
     for k in range(3):
-        put(env, {0: env._drawn.handed(k).vector})
+        put(env, {0: env.episode.layout.layout.handed(k).vector})
         for _ in range(50):
             after, *_ = env.step(IDLE)
-        assert np.abs(after["object_pose"][0, :3] - env._drawn.handed(k).position).max() < 2e-3
+        assert np.abs(after["object_pose"][0, :3] - env.episode.layout.layout.handed(k).position).max() < 2e-3
 
 
 @pytest.mark.parametrize("n_books", [0, 4, 2.0, True, "3"])

@@ -204,7 +204,7 @@ def test_one_that_appears_waits_for_its_motion_its_delay_and_for_room(env, monke
     blocked = ScheduledObstacle(Sphere(0.04), tcp, motion=1)
     started(env, later, never, blocked)
     index = property(lambda _: 1.0 if env._steps >= 10 else 0.0)
-    monkeypatch.setattr(type(env._progress), "motion_index", index)
+    monkeypatch.setattr(type(env.episode.progress), "motion_index", index)
     shown = [env.step(IDLE)[0]["obstacle_active"].tolist() for _ in range(60)]
     assert shown.index([1, 0, 0]) == pytest.approx(10 + 0.5 / env.control_dt, abs=2)
     assert shown[-1] == [1, 0, 0]
@@ -266,7 +266,7 @@ def test_nothing_appears_nearer_than_promised(monkeypatch):
     x, y, z = observation["tcp_pose"][0, :3]
     for offset, room in ((CLEARANCE + 0.02, True), (CLEARANCE - 0.03, False)):
         started(env, ScheduledObstacle(Sphere(0.02), (x, y, z - 0.02 - offset), motion=1))
-        monkeypatch.setattr(type(env._progress), "motion_index", property(lambda _: 1.0))
+        monkeypatch.setattr(type(env.episode.progress), "motion_index", property(lambda _: 1.0))
         env.step(IDLE)
         assert env.sim.obstacles.active[0] == room
     env.close()

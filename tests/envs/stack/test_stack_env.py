@@ -187,7 +187,7 @@ def test_wanted_contacts():
 
 def test_every_unwanted_pair_counts_and_the_last_one_is_named(env):
     env.reset(seed=0)
-    progress = env._progress
+    progress = env.episode.progress
     touching = np.zeros_like(env.sim.read().touching)
     for pair in ((WORLD, FIRST_OBJECT), (ARM, FINGERS), (WORLD, FINGERS), (ARM, FIRST_OBJECT + 1)):
         touching[pair] = 1.0
@@ -200,7 +200,7 @@ def test_every_unwanted_pair_counts_and_the_last_one_is_named(env):
 def test_a_lifted_block_that_stands_elsewhere_was_dropped_and_one_in_the_hand_was_not(env):
     env.reset(seed=0)
     state = env.sim.read()
-    progress = GoalProgress(env._rules, env._goal_pose, state.object_pose, env.control_dt)
+    progress = GoalProgress(env.declared.rules, env.episode.goals, state.object_pose, env.control_dt)
 
     def failure(height, gripped, speed=0.0):
         poses, touching = state.object_pose.copy(), np.zeros_like(state.touching)

@@ -172,7 +172,7 @@ def test_goals_in_order_and_objects_that_must_stay():
     env = gym.make(register_task(replace(CUP_ON_PAD, name="cup_beside_cube", goals=goals, success=success)))
     assert put(env, ON_PAD, ON_PLACE)["success"]
     env.reset(seed=0)
-    progress, state = env.unwrapped._progress, env.unwrapped.sim.read()
+    progress, state = env.unwrapped.episode.progress, env.unwrapped.sim.read()
     for shift, failure in ((0.019, ""), (0.021, "constraint")):
         poses = state.object_pose + np.array([[0.0] * 7, [shift, *[0.0] * 6]])
         progress.view.see(state, env.unwrapped.sim, 0.0)
