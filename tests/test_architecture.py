@@ -18,7 +18,7 @@ LOWER = {
 ORDER = {
     "planner": """
         errors lazy_names deferred_imports ranges arrays jit columns strict_json geometry models robot collision fitting
-        control imitation skills recordings log escape safety judge planning reactive
+        control imitation skills recordings log escape constraints safety judge planning reactive
     """,
     "envs": "errors registration dotted_names mujoco_library scene simulation core stack pour shelve guests tasks",
     "configs": """
