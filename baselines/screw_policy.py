@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from ..envs import TaskDescription
 from ..planner import Demonstration, PlanSettings, Pose, RepetSettings
+from ..planner.imitation.constraint import ConstraintSettings, Keeping
 from .motion.motion_method import SCREW, MotionMethod
 from .motion.settings import ProgramSettings
 from .program_policy import ProgramPolicy
@@ -18,11 +19,15 @@ class ScrewSettings(ProgramSettings):
     Attributes:
         repet: settings of detours around obstacles; see `RepetSettings`.
         avoid: False: no detours and no search in joint space, only the safety layer.
+        constraint: tolerances of what is kept while something is carried; see `ConstraintSettings`.
+        keeping: how it is kept: "must", "prefer" or "free"; see `PlanSettings`.
         whole_arm: False: only the hand and the held object are checked, as in the paper.
     """
 
     repet: RepetSettings = field(default_factory=RepetSettings)
     avoid: bool = True
+    constraint: ConstraintSettings = field(default_factory=ConstraintSettings)
+    keeping: Keeping = "prefer"
     whole_arm: bool = True
 
     @property
@@ -34,7 +39,13 @@ class ScrewSettings(ProgramSettings):
     def plan(self) -> PlanSettings:
         """See `ProgramSettings`."""
         return PlanSettings(
-            motion=self.motion, repet=self.repet, safety=self.safety, avoid=self.avoid, guard=self.guard
+            motion=self.motion,
+            repet=self.repet,
+            safety=self.safety,
+            avoid=self.avoid,
+            guard=self.guard,
+            constraint=self.constraint,
+            keeping=self.keeping,
         )
 
     def visible_part(self, task: TaskDescription) -> TaskDescription:

@@ -229,7 +229,12 @@ class ArmExecutor:
         if plan is not None and plan.how == PATH:
             self._planner.follow(plan, exact=exact)
         else:
-            self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours, must_keep=must_keep)
+            kept = None if plan is None or plan.constraint is None else plan.constraint.ending(len(path))
+            keeping = None if plan is None else plan.request.keeping
+            self._planner.go(
+                path, exact=exact, next_motion=next_motion, detours=detours, must_keep=must_keep, constraint=kept,
+                keeping=keeping,
+            )  # fmt: skip
         led = plan if plan is not None and plan.how == ESCAPE else None
         if led:
             nominal = final_path(self.arm.fk(self.q), led.imitated, led.guide)

@@ -30,6 +30,7 @@ from ...planner import (
 )
 from ...planner.errors import PlanFailed
 from ...planner.geometry.shapes import moves
+from ...planner.imitation.constraint import Constraint, Keeping
 from ...planner.imitation.tsia import departure, screw_path
 from ...planner.planning.joint_space_motion import MAX_DEVIATION
 from ..motion.motion_method import DIRECT, ESCAPE, MADE, SCREW, MotionMethod
@@ -57,6 +58,8 @@ class MotionChoice(NamedTuple):
         searched: number of goals for which joint space is searched; None: all of them.
         parts: number of motions, this one and those that follow, without which it is none.
         clearance: margin [m] of objects while it is followed.
+        constraint: what the demonstrated segment keeps; None: what is found in it if the hand holds something.
+        keeping: how it is kept, see `PlanRequest.keeping`.
         blindly: the best is followed even if no plan arrives: what the guard and the moment allow decides.
         reaches: quick test whether the arm has a posture at a goal; goals without one are left out; None: no test.
     """
@@ -74,6 +77,8 @@ class MotionChoice(NamedTuple):
     guided: bool = True
     exact: bool = True
     must_keep: bool = False
+    constraint: Constraint | None = None
+    keeping: Keeping | None = None
     enough: Enough | None = None
     searched: int | None = None
     parts: int = 1
@@ -258,11 +263,12 @@ def _choices(
     if not (motion.detours and motion.guided):
         settings = replace(settings, motion=replace(settings.motion, guide=0.0))
     planner, away = motion_method.planner(arm, motion.body, settings), departure_path(arm, settings, q, motion)
+    first = motion_method.skipped(motion.done)
     for index in motion.candidates:
-        goal = motion.goals[index]
+        goal, shown = motion.goals[index], motion.demonstrated[first:]
         following = None if motion.then is None else motion.then(index)
         plan = planner.plan(
-            motion.demonstrated[motion_method.skipped(motion.done) :],
+            shown,
             q,
             goal,
             _still(motion),
@@ -270,6 +276,8 @@ def _choices(
             leaving=away,
             next_motion=None if following is None else _beginning(following, goal, settings),
             must_keep=motion.must_keep,
+            constraint=None if motion.constraint is None else motion.constraint.ending(len(shown)),
+            keeping=motion.keeping,
         )
         choice = ChosenMotion(index, plan, away, motion=motion)
         if plan.success and following is not None:

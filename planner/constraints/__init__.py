@@ -1,1 +1,1 @@
-"""Compiled constraints: what a demonstration keeps, measured at poses and certified along joint lines; their searches."""
+"""Compiled constraints: what a demonstration keeps, measured, certified along joint lines, and searched on."""

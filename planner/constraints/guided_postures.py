@@ -119,6 +119,14 @@ def _normal(state):
 
 
 @inner
+def _in_ball(radius, state):
+    """Random vector in a ball; what is outside, in the cube around it, is moved onto it, where most room is used."""
+    a, b, c = 2.0 * random_number(state) - 1.0, 2.0 * random_number(state) - 1.0, 2.0 * random_number(state) - 1.0
+    scale = radius / max(1.0, math.sqrt(a * a + b * b + c * c))
+    return (scale * a, scale * b, scale * c)
+
+
+@inner
 def off_path(x, position, rotation, state):
     """Pose off a pose by a random part of the bounds.
 
@@ -128,12 +136,7 @@ def off_path(x, position, rotation, state):
         rotation: bound [rad].
         state: (1,) of the random numbers.
     """
-    # a cube of this size lies within the ball of the bound
-    size = 1.1
-    turn = (size * rotation * (random_number(state) - 0.5), size * rotation * (random_number(state) - 0.5),
-            size * rotation * (random_number(state) - 0.5))  # fmt: skip
-    shift = (size * position * (random_number(state) - 0.5), size * position * (random_number(state) - 0.5),
-             size * position * (random_number(state) - 0.5))  # fmt: skip
+    turn, shift = _in_ball(rotation, state), _in_ball(position, state)
     y = screw.mul(x, screw.from_twist((0.0, 0.0, 0.0, turn[0], turn[1], turn[2])))
     p = screw.translation(x)
     return screw.from_pose((p[0] + shift[0], p[1] + shift[1], p[2] + shift[2]), (y[0], y[1], y[2], y[3]))

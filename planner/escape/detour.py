@@ -15,8 +15,9 @@ from .escape_tree import grow
 from .tree_arrays import DETOUR_LOG, NODE, OPTION
 
 FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
+GUIDED_BLOCKED = 7
 """Status of an escape: the path was clear; detours were found; then the reasons of a failure. NODE_LIMIT: a tree was
-stopped while it still had open leaves."""
+stopped while it still had open leaves. GUIDED_BLOCKED: no detour ends before the object is guided along the path."""
 MIN_SLACK = 0.005
 """Least slack [m] of a root and of the pose where a detour rejoins, if an obstacle's own margin fills the shell."""
 
@@ -261,7 +262,13 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
             return (ESCAPED if detour else FREE), count, detour
         _slacks(g, path, count, slacks, enough)
         root = _root(slacks, blocked, enough)
-        size = _candidates(path, slacks, count, blocked, enough, most, places, poses)
+        # where the object is guided no detour may begin or end: that would leave the demonstrated way
+        last = count if options[OPTION.guided] <= 0.0 else count - int(options[OPTION.guided]) + 1
+        if blocked >= last - 1:
+            return GUIDED_BLOCKED, count, detour
+        size = _candidates(path, slacks, last, blocked, enough, most, places, poses)
+        if size == 0:
+            return GUIDED_BLOCKED, count, detour
         row, j, rows, full = _grown(g, path[root], poses[:size], tree, cells, heap, options, state)
         log[detour, DETOUR_LOG.tree_rows] = rows
         if row < 0:

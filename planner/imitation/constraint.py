@@ -127,6 +127,10 @@ class Constraint:
         count = min(stop, self.count) - start
         return replace(self, count=count, guided=min(max(self.guided - start, 0), count))
 
+    def ending(self, count: int) -> Constraint:
+        """Return the constraint of another path of a number of poses that ends with the last poses of this one."""
+        return replace(self, count=count, guided=max(0, count - (self.count - self.guided)))
+
     def of_lengths(self, before: np.ndarray, after: np.ndarray) -> Constraint:
         """Return the constraint of the same path with other poses.
 
@@ -135,6 +139,8 @@ class Constraint:
             after: (m,) path lengths of the new ones.
         """
         count = len(after)
+        if count == self.count:
+            return self
         if self.guided >= self.count:
             return replace(self, count=count, guided=count)
         share = before[self.guided] / max(before[-1], 1e-12)

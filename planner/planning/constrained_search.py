@@ -9,7 +9,7 @@ the paper.
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -41,14 +41,17 @@ from .joint_space_rrt import sample_ranges
 from .planning_scene import PlanningScene
 from .settings import PlanSettings
 
+Result = TypeVar("Result")
 EVERY = 0.04
 """Path length [m] between two places along the guided stretch."""
 MOST = 200
 """Largest number of postures of a place."""
 PUSH = 0.3
 """Deviation [rad or m] of a joint by which a posture is pushed along its redundancy."""
-USED = 0.7
+USED = 0.85
 """Share of the bounds off the path that postures use: the rest is for the lines between them."""
+MOST_ROUNDS, MORE = 2, 3
+"""Largest number of rounds, and factor by which the next has more: seeds, postures of a place, tried from each."""
 STEADY = 0.5
 """Share of the bound against gravity that shortcuts use: a shorter way is not worth a tilt near the bound."""
 BRANCHES = 4
@@ -118,9 +121,9 @@ class ConstrainedSearch:
         search = self.settings.search
         assert search is not None
         failure = SearchFailure(IK_OR_LIMIT, "")
-        for turn in range(search.rounds):
+        for turn in range(min(search.rounds, MOST_ROUNDS)):
             for first in self._entries():
-                found = yield from self._from(first, search.seeds * 2**turn, search.iterations)
+                found = yield from self._from(first, search.seeds, search.iterations, MORE**turn)
                 if not isinstance(found, SearchFailure):
                     return found
                 failure = found
@@ -133,9 +136,11 @@ class ConstrainedSearch:
         last = len(self.imitated) - 1
         return sorted({guide_index(self.imitated, self.settings.motion.max_guide), last})
 
-    def _from(self, first: int, seeds: int, iterations: int) -> Generator[int, None, JointSpaceMotion | SearchFailure]:
-        """Search a motion that joins the imitated path at a pose."""
-        flood = yield from self._flooded(self.imitated[first:], seeds)
+    def _from(
+        self, first: int, seeds: int, iterations: int, more: int
+    ) -> Generator[int, None, JointSpaceMotion | SearchFailure]:
+        """Search a motion that joins the imitated path at a pose, with more postures than at first."""
+        flood = yield from self._flooded(self.imitated[first:], more * seeds, more)
         if isinstance(flood, SearchFailure):
             return flood
         count = int(flood.counts[0])
@@ -153,19 +158,20 @@ class ConstrainedSearch:
         entry = int(order[np.abs(entries[order] - points[-1]).max(axis=1).argmin()])
         return self._motion(points, flood, entry, first)
 
-    def _flooded(self, path: PosePath, seeds: int) -> Generator[int, None, _Flood | SearchFailure]:
+    def _flooded(self, path: PosePath, seeds: int, more: int) -> Generator[int, None, _Flood | SearchFailure]:
         """Lead the postures of the end of a path back to its beginning."""
         length = float(path.lengths()[-1]) if len(path) > 1 else 0.0
         places = key_poses(path, max(2, int(np.ceil(length / EVERY)) + 1)).dqs if length > 0.0 else path.dqs[-1:]
         count = len(places)
-        flood = _Flood(places, np.zeros((count, MOST, self.arm.dof)), np.full((count, MOST), -1.0), np.zeros(count))
+        room = more * MOST
+        flood = _Flood(places, np.zeros((count, room, self.arm.dof)), np.full((count, room), -1.0), np.zeros(count))
         failure = yield from self._ends(flood, seeds)
         if failure is not None:
             return failure
         options = np.empty(FLOOD.width)
         options[FLOOD.position] = USED * self.constraint.position_bound
         options[FLOOD.rotation] = USED * self.constraint.rotation_bound
-        options[FLOOD.push], options[FLOOD.branches] = PUSH, BRANCHES
+        options[FLOOD.push], options[FLOOD.branches] = PUSH, more * BRANCHES
         for place in range(count - 1, 0, -1):
             for k in range(0, int(flood.counts[place]), SLICE):
                 last = min(k + SLICE, int(flood.counts[place]))
@@ -295,3 +301,12 @@ def timed_through(points: np.ndarray, speeds: np.ndarray, dt: float) -> np.ndarr
     # the same ramps as on one line: the time at full speed is the place on it
     place = timed_on_lines(np.array([[0.0], [seconds[-1]]]), np.ones(1), dt)[:, 0]
     return np.column_stack([np.interp(place, seconds, column) for column in points.T])
+
+
+def done(work: Generator[int, None, Result]) -> Result:
+    """Return the result of work, done to its end."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return end.value

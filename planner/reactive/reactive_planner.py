@@ -16,11 +16,13 @@ from numpy.typing import ArrayLike
 
 from ..arrays import checked_kind, checked_settings
 from ..collision.step_certificates import near_pair_slack
+from ..constraints.request_constraint import remembered_constraint
 from ..control.arm_arrays import ARM, PURSUIT_STATE, arm_arrays
 from ..control.pursuit import ARRIVED, fresh_pursuit_state
 from ..escape.repet import MAX_OBSTACLES
 from ..geometry.pose import Pose, PosePath, nearest
 from ..geometry.shapes import Obstacle, moves
+from ..imitation.constraint import Constraint, Keeping
 from ..imitation.reduction import reduced
 from ..planning.joint_space_motion import MAX_DEVIATION, path_deviation
 from ..planning.plan import NextMotion, Plan, check_success
@@ -100,32 +102,31 @@ class ReactivePlanner:
             self._scene.move(self._ahead())
 
     def go(
-        self,
-        path: PosePath,
-        *,
-        exact: bool = True,
-        next_motion: NextMotion | None = None,
-        detours: bool = True,
-        must_keep: bool = False,
-    ) -> None:
+        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True,
+        must_keep: bool = False, constraint: Constraint | None = None, keeping: Keeping | None = None,
+    ) -> None:  # fmt: skip
         """Follow a path to its end, joined from wherever the arm is.
 
         Args:
             path: of the tcp; of very long paths poses at even steps of their length, see `RepetSettings.longest`.
             exact: False: done as soon as the tool is within reach of the end.
             next_motion: the motion that follows: where there is a choice, the path ends in a posture that suits it.
-            detours: False: along the path or not at all, without detour or search; where the safety layer leads away
-                from the path, the arm stands still, if it can.
+            detours: False: along the path or not at all; where the safety layer leads off it, the arm stands still.
             must_keep: new plans must keep some of the path, see `PlanRequest.must_keep`.
+            constraint: what the path keeps; None: what is found in it if the hand holds something.
+            keeping: how it is kept, see `PlanRequest.keeping`.
         """
         checked_kind("path", path, PosePath)
         if next_motion is not None:
             checked_kind("next_motion", next_motion, NextMotion)
-        path = reduced(path, max(self.settings.plan.repet.longest, 2)).path
-        packed = pursuit_of(self.settings.plan.motion.pursuit, exact=exact).packed()
-        self._work[ARM.pursuit, : len(packed)] = packed
-        plan_now = bool(self._obstacles) and detours
-        self.motion = MotionState(path, detours, next_motion, must_keep, plan_now=plan_now)
+        given, path = path, reduced(path, max(self.settings.plan.repet.longest, 2)).path
+        if constraint is not None or self.body.held:
+            constraint = constraint or remembered_constraint(given, self.settings.plan.constraint)
+            constraint = constraint.of_lengths(given.lengths(), path.lengths())
+        pursuit = pursuit_of(self.settings.plan.motion.pursuit, exact=exact).packed()
+        self._work[ARM.pursuit, : len(pursuit)] = pursuit
+        now = bool(self._obstacles) and detours
+        self.motion = MotionState(path, detours, next_motion, must_keep, constraint, keeping, plan_now=now)
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """Follow the path of a plan to its end.
@@ -216,7 +217,7 @@ class ReactivePlanner:
 
     def _detours(self, motion: MotionState, q: np.ndarray, conflict: float) -> Iterator[Plan]:
         """Detours round the places where moving obstacles will be, passing before or behind them."""
-        rest = motion.nominal[self._now_at(motion, q) :]
+        rest, kept = motion.nominal[(at := self._now_at(motion, q)) :], motion.kept_from(at)
         still = [obstacle for obstacle in self._obstacles if not moves(obstacle)]
         for start, end in windows(conflict, self.settings.horizon):
             # an obstacle about to leave the arm or the goal alone: the roll-out shows whether it does in time
@@ -224,7 +225,7 @@ class ReactivePlanner:
             around = still + places
             if len(around) <= MAX_OBSTACLES:
                 allowed = self._known_allowed(around)
-                plan = self._quick.plan(rest, q, rest[-1], around, allowed=allowed, seed=motion.tries)
+                plan = self._quick.plan(rest, q, rest[-1], around, allowed=allowed, seed=motion.tries, **kept)
                 if plan.how == "escape":
                     yield plan
 
@@ -275,12 +276,11 @@ class ReactivePlanner:
         waited = motion.pursuit[PURSUIT_STATE.waited]
         if waited > self.settings.patience:
             motion.stalled += waited
-            # an obstacle that stands still at the goal will not leave it; without detours a new plan changes nothing
+            # a still obstacle at the goal will not leave it; without detours a new plan changes nothing
             hopeless = (not self._moving or not motion.detours) and motion.tries >= 3
             hopeless |= not self._moving and motion.refusal[0] == "goal in collision"
             if hopeless or motion.stalled > self.settings.give_up:
-                tight, distance = self._scene.tightest_seen(), self.settings.plan.safety.distance
-                motion.fail(*why_stalled(motion, tight, distance))
+                motion.fail(*why_stalled(motion, self._scene.tightest_seen(), self.settings.plan.safety.distance))
                 return self._stand_still(q)
             motion.tries += 1
             motion.pursuit[PURSUIT_STATE.waited] = 0.0
@@ -296,10 +296,10 @@ class ReactivePlanner:
         motion.reached = self._now_at(motion, q)
         rest = motion.nominal[motion.reached :]
         allowed = self._known_allowed(obstacles)
-        then, keep = motion.next_motion, motion.must_keep
         plan = self._planner.plan(
-            rest, q, rest[-1], obstacles, allowed=allowed, next_motion=then, seed=motion.tries, must_keep=keep
-        )
+            rest, q, rest[-1], obstacles, allowed=allowed, next_motion=motion.next_motion, seed=motion.tries,
+            **motion.kept_from(motion.reached),
+        )  # fmt: skip
         motion.refusal = plan.reason, plan.detail
         if plan.success and plan.how == "joint search":
             motion.track(plan.joints, plan.path)
