@@ -52,6 +52,8 @@ USED = 0.85
 """Share of the bounds off the path that postures use: the rest is for the lines between them."""
 MOST_ROUNDS, MORE = 2, 3
 """Largest number of rounds, and factor by which the next has more: seeds, postures of a place, tried from each."""
+WORTH = 0.5
+"""Share of the guided stretch that postures must lead along at first for a further round: others reach no farther."""
 STEADY = 0.5
 """Share of the bound against gravity that shortcuts use: a shorter way is not worth a tilt near the bound."""
 BRANCHES = 4
@@ -114,6 +116,7 @@ class ConstrainedSearch:
         self._solver = arm_arrays(arm, _SOLVE)
         self._solver[ARM.speed] = 0.5
         self._low, self._high = sample_ranges(arm.lower, arm.upper, q)
+        self._share_led = 1.0
         self._rows, self._scratch = np.empty((PARTS, arm.dof)), np.empty(arm.dof)
 
     def run(self) -> Generator[int, None, JointSpaceMotion | SearchFailure]:
@@ -127,6 +130,8 @@ class ConstrainedSearch:
                 if not isinstance(found, SearchFailure):
                     return found
                 failure = found
+            if self._share_led < WORTH:
+                break
         return failure
 
     def _entries(self) -> list[int]:
@@ -147,6 +152,7 @@ class ConstrainedSearch:
         if not count:
             k = int(np.argmax(flood.counts > 0)) - 1
             share = 1.0 - (k + 1) / max(len(flood.places) - 1, 1)
+            self._share_led = share
             return SearchFailure(
                 NO_GUIDED_WAY, f"postures lead along no more than the last {100.0 * share:.0f} % of it"
             )
