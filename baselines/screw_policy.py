@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from ..envs import TaskDescription
 from ..planner import Demonstration, PlanSettings, Pose, RepetSettings
+from ..planner.imitation.constraint import ConstraintSettings, Keeping
 from ..planner.planning.settings import JointSearchSettings
 from .motion.motion_method import SCREW, MotionMethod
 from .motion.settings import GUARDED, ProgramSettings
@@ -21,6 +22,8 @@ class ScrewSettings(ProgramSettings):
         trees: False: no escape trees, so no detours of the tool around obstacles.
         search: False: no RRT-Connect in joint space where nothing else leads to a goal. With neither trees nor search,
             obstacles are left to the safety layer.
+        constraint: tolerances of what is kept while something is carried; see `ConstraintSettings`.
+        keeping: how it is kept: "must", "prefer" or "free"; see `PlanSettings`.
         whole_arm: False: only the hand and the held object are checked, as in the paper.
         hold: as in `ProgramSettings`, guarded by default.
     """
@@ -28,6 +31,8 @@ class ScrewSettings(ProgramSettings):
     repet: RepetSettings = field(default_factory=RepetSettings)
     trees: bool = field(default=True, metadata={"formerly": "avoid"})
     search: bool = field(default=True, metadata={"formerly": "avoid"})
+    constraint: ConstraintSettings = field(default_factory=ConstraintSettings)
+    keeping: Keeping = "prefer"
     whole_arm: bool = True
     hold: str = GUARDED
 
@@ -41,7 +46,14 @@ class ScrewSettings(ProgramSettings):
         """See `ProgramSettings`."""
         search = JointSearchSettings() if self.search else None
         return PlanSettings(
-            motion=self.motion, repet=self.repet, safety=self.safety, search=search, trees=self.trees, guard=self.guard
+            motion=self.motion,
+            repet=self.repet,
+            safety=self.safety,
+            search=search,
+            trees=self.trees,
+            guard=self.guard,
+            constraint=self.constraint,
+            keeping=self.keeping,
         )
 
     def visible_part(self, task: TaskDescription) -> TaskDescription:

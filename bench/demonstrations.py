@@ -20,17 +20,19 @@ app = typer.Typer(
 def check(
     file: Annotated[str, typer.Argument(help="A demonstration (.npz), or the name of a shipped one, like stack.")],
     task: Annotated[str, typer.Option(help="Your own task, my_tasks:MY_TASK: its shapes make the skill sharper.")] = "",
+    picture: Annotated[Path | None, typer.Option(help="Draw what is kept (.png, .pdf or .svg).")] = None,
 ) -> None:
     """Validate a demonstration and print its content.
 
-    Prints duration, samples, the segments with the screw motion of each, the skill that is found where objects or
-    joints of the scene were recorded, source, licence, and warnings about anything unusual. Exits with code 2 and one
-    line if the file cannot be used.
+    Prints duration, samples, the segments with the screw motion of each, what is kept while something is carried
+    (docs/constraints.md), the skill that is found where objects or joints of the scene were recorded, source, licence,
+    and warnings about anything unusual. Exits with code 2 and one line if the file cannot be used.
 
     Example: onedemo demo check stack
     """
     from ..configs import load_demonstration
     from ..planner.imitation.demonstration_warnings import warnings_of
+    from .recordings.constraint_summary import constraint_lines, draw_constraints
     from .recordings.summary import facts, segment_lines, skill_lines
 
     path = demonstration_path(file)
@@ -46,8 +48,16 @@ def check(
         out.print(f"  {segment.name}", style="bold")
         for line in segment_lines(demo, segment):
             out.print(f"    {line}")
+    out.print("kept while it is carried, as found in the path of the hand:")
+    for line in constraint_lines(demo):
+        out.print(f"  {line}")
     for line in skill_lines(demo, task):
         out.print(line)
+    if picture is not None:
+        check_picture(picture)
+        with writing("--picture", picture):
+            draw_constraints(demo, picture)
+        out.print(f"wrote {picture}")
     warnings = warnings_of(demo)
     for warning in warnings:
         out.print(labeled("warning", "yellow", warning))

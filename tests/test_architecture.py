@@ -18,7 +18,8 @@ LOWER = {
 ORDER = {
     "planner": """
         errors lazy_names deferred_imports ranges arrays jit columns strict_json resumable geometry models robot
-        collision fitting control imitation skills recordings log escape search safety judge planning reactive
+        collision fitting control imitation skills recordings log escape constraints search safety judge planning
+        reactive
     """,
     "envs": """
         errors dotted_names facts mujoco_library scene simulation judge core stack pour shelve guests shipped

@@ -27,6 +27,7 @@ from ...planner import (
     guide_index,
 )
 from ...planner.control.arm_arrays import PURSUIT_STATE
+from ...planner.imitation.constraint import Constraint, Keeping
 from ...planner.planning.plan import check_success
 from ...planner.reactive.motion_state import MotionState
 from ...planner.resumable import CALL, Resumable
@@ -72,6 +73,8 @@ class GeneratedFollower(ReactivePlanner):
         next_motion: NextMotion | None = None,
         detours: bool = True,
         must_keep: bool = False,
+        constraint: Constraint | None = None,
+        keeping: Keeping | None = None,
     ) -> None:
         """See `ReactivePlanner`: the path, from about where the arm is, is the demonstrated path, its end the goal."""
         super().go(path, exact=exact, detours=detours)

@@ -28,6 +28,7 @@ from ...planner import (
     final_path,
     guide_index,
 )
+from ...planner.imitation.constraint import Constraint, Keeping
 from ...planner.imitation.tsia import GUIDE_START
 from ...planner.planning.plan import MotionPlanner
 
@@ -61,6 +62,8 @@ class Follower(Protocol):
         next_motion: NextMotion | None = None,
         detours: bool = True,
         must_keep: bool = False,
+        constraint: Constraint | None = None,
+        keeping: Keeping | None = None,
     ) -> None:
         """See `ReactivePlanner.go`: follow a path to its end."""
         ...

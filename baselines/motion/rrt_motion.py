@@ -23,6 +23,7 @@ from ...planner import (
 )
 from ...planner.collision.clearance import slack_at
 from ...planner.control.inverse_kinematics import inverse_kinematics
+from ...planner.imitation.constraint import Constraint, Keeping
 from ...planner.planning.joint_space_motion import SearchFailure
 from ...planner.search.joint_space_rrt import sample_ranges
 from ..extras import needed
@@ -55,6 +56,8 @@ class RrtFollower(ReactivePlanner):
         next_motion: NextMotion | None = None,
         detours: bool = True,
         must_keep: bool = False,
+        constraint: Constraint | None = None,
+        keeping: Keeping | None = None,
     ) -> None:
         """See `ReactivePlanner`: only the end of the path matters."""
         super().go(path, exact=exact)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...planner import Arm, Body, Command, NextMotion, Plan, PlanRequest, PlanSettings, Pose, PosePath, ReactiveSettings
 from ...planner.geometry import dualquat as dq
+from ...planner.imitation.constraint import Constraint, Keeping
 from ...planner.planning.plan import MotionPlanner
 from ...planner.resumable import Resumable
 from .motion_method import Follower, MotionMethod, Relative
@@ -100,10 +101,21 @@ class ToolFrameFollower:
         next_motion: NextMotion | None = None,
         detours: bool = True,
         must_keep: bool = False,
+        constraint: Constraint | None = None,
+        keeping: Keeping | None = None,
     ) -> None:
         """See `Follower`."""
         there, path = _next_motion(next_motion, self._tool), path.with_tool(self._tool)
-        self._follower.go(path, exact=exact, next_motion=there, detours=detours, must_keep=must_keep)
+        kept = None if constraint is None else constraint.with_tool(self._tool)
+        self._follower.go(
+            path,
+            exact=exact,
+            next_motion=there,
+            detours=detours,
+            must_keep=must_keep,
+            constraint=kept,
+            keeping=keeping,
+        )
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """See `Follower`."""

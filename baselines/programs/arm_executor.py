@@ -234,7 +234,8 @@ class ArmExecutor:
         if plan is not None and plan.how == PATH:
             self._planner.follow(plan, exact=exact)
         else:
-            self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours, must_keep=must_keep)
+            kept = plan.kept_along(path) if plan is not None else {}
+            self._planner.go(path, exact=exact, next_motion=next_motion, detours=detours, must_keep=must_keep, **kept)
         led = plan if plan is not None and plan.how == ESCAPE else None
         if led:
             self.drawn.append(LabeledPath("final", "", final_path(self.arm.fk(self.q), led.imitated, led.guide)))

@@ -30,6 +30,7 @@ from ...planner import (
 )
 from ...planner.errors import PlanFailed
 from ...planner.geometry.shapes import moves
+from ...planner.imitation.constraint import Constraint, Keeping
 from ...planner.imitation.tsia import departure, screw_path
 from ...planner.planning.joint_space_motion import MAX_DEVIATION
 from ...planner.resumable import SOLVED, Resumable
@@ -61,6 +62,8 @@ class MotionChoice(NamedTuple):
         searched: number of goals for which joint space is searched; None: all of them.
         parts: number of motions, this one and those that follow, without which it is none.
         clearance: margin [m] of objects while it is followed.
+        constraint: what the demonstrated segment keeps; None: what is found in it if the hand holds something.
+        keeping: how it is kept, see `PlanRequest.keeping`.
         blindly: the best is followed even if no plan arrives: what the guard and the moment allow decides.
         reaches: quick test whether the arm has a posture at a goal; goals without one are left out; None: no test.
     """
@@ -78,6 +81,8 @@ class MotionChoice(NamedTuple):
     guided: bool = True
     exact: bool = True
     must_keep: bool = False
+    constraint: Constraint | None = None
+    keeping: Keeping | None = None
     enough: Enough | None = None
     searched: int | None = None
     parts: int = 1
@@ -279,22 +284,21 @@ def _best(
         settings = replace(settings, trees=False, search=None, max_deviation=MAX_DEVIATION)
     if not (motion.detours and motion.guided):
         settings = replace(settings, motion=replace(settings.motion, guide=0.0))
-    found: list[ChosenMotion] = []
-    if known is not None:
-        found.append(known)
-        if motion.is_enough(known):
-            return known
-    planner, away = (
-        motion_method.planner(arm, motion.body, settings),
-        (yield from departure_path(arm, settings, q, motion)),
-    )
+    found = [] if known is None else [known]
+    if known is not None and motion.is_enough(known):
+        return known
+    planner = motion_method.planner(arm, motion.body, settings)
+    away = yield from departure_path(arm, settings, q, motion)
     for index in (yield from motion.candidates()):
         goal = motion.goals[index]
         following = None if motion.then is None else motion.then(index)
         yield PREPARED
         beginning = None if following is None else _beginning(following, goal, given)
         shown = motion.demonstrated[motion_method.skipped(motion.done) :]
-        request = PlanRequest(shown, q, goal, _still(motion), motion.allowed, away, beginning, 0, motion.must_keep)
+        request = PlanRequest(
+            shown, q, goal, _still(motion), motion.allowed, away, beginning, 0, motion.must_keep,
+            None if motion.constraint is None else motion.constraint.ending(len(shown)), motion.keeping,
+        )  # fmt: skip
         plan = yield from planner.answering(request)
         choice = ChosenMotion(index, plan, away, motion=motion)
         if plan.success and following is not None:

@@ -11,6 +11,7 @@ import numpy as np
 from ...envs import TaskDescription
 from ...envs.scene.body_clearance import tool_clearance
 from ...planner import Body, Obstacle, Pose, PosePath, imitated_path
+from ...planner.constraints.request_constraint import remembered_constraint
 from ...planner.geometry.shapes import pack
 from ...planner.imitation.segmentation import resampled
 from ...planner.imitation.tsia import departure, ending, screw_path
@@ -177,15 +178,9 @@ class SkillMotions:
         return screw_path(here, _up(height) @ here, self.settings.resample)
 
     def placing(
-        self,
-        carry: Phase,
-        held: Pose,
-        *,
-        lift: bool = False,
-        tail: float = math.inf,
-        failed: Collection[int] = (),
-        clearance: float = OBJECT_MARGIN,
-    ) -> MotionChoice:
+        self, carry: Phase, held: Pose, *, lift: bool = False, tail: float = math.inf,
+        failed: Collection[int] = (), clearance: float = OBJECT_MARGIN,
+    ) -> MotionChoice:  # fmt: skip
         """Return the motion of the hand that carries an object.
 
         Args:
@@ -260,11 +255,15 @@ class SkillMotions:
             motion = motion._replace(blindly=phase.kind == "carry")
         if phase.before is None and math.isinf(phase.touch_within):
             return motion._replace(then=then)
+        begun = ended = None
         if phase.before is not None:
             first, second = self._before[phase.name], motion.demonstrated
             starts = [self._imitated(phase, second, goal)[0] for goal in motion.goals]
         else:
             split = self._near(phase, imitated_path(motion.demonstrated, motion.goals[0]), motion.body)
+            if motion.body.held:  # found in the whole path: its parts do not show what they are parts of
+                kept = remembered_constraint(motion.demonstrated, self.settings.plan.constraint)
+                begun, ended = kept.part(0, split + 1), kept.part(split, kept.count)
             first, second = motion.demonstrated[: split + 1], motion.demonstrated[split:]
             starts = [imitated_path(second, goal)[0] for goal in motion.goals]
 
@@ -278,6 +277,7 @@ class SkillMotions:
                 detours=not phase.exact,
                 guided=False,
                 must_keep=phase.must_keep,
+                constraint=ended,
                 enough=None,
                 then=None if then is None else lambda _, on=then: on(index),
             )
@@ -291,6 +291,7 @@ class SkillMotions:
             parts=2,
             done=0,
             exact=phase.before is not None,
+            constraint=begun,
         )
 
     def _imitated(self, phase: Phase, path: PosePath, goal: Pose) -> PosePath:
@@ -315,15 +316,15 @@ class SkillMotions:
         leaving: PosePath | None = None,
     ) -> MotionChoice:
         executor, index = self.executor, None if held is None else self.index(phase)
-        around = executor.world_model.obstacles_if_holding(executor.observation, index)
-        body = executor.empty
+        body, around = executor.empty, executor.world_model.obstacles_if_holding(executor.observation, index)
         if held is not None and index is not None:
             body = executor.body_with(self.task.objects[index].parts, held)
-        names = {obstacle.name for obstacle in around}
+        names = {each.name for each in around}
         wanted = dict.fromkeys((*self.task.touching, *self.contacts(phase, brushed=brushed)))
         allowed = tuple(pair for pair in wanted if pair[0] in body.names and pair[1] in names)
-        reaches = self._postures.reach if len(goals) > FEW and not phase.as_shown else None
-        return MotionChoice(phase.name, shown, tuple(goals), body, around, allowed, leaving, reaches=reaches)
+        reaches, keeping = self._postures.reach if len(goals) > FEW and not phase.as_shown else None, phase.keeping
+        goals = tuple(goals)
+        return MotionChoice(phase.name, shown, goals, body, around, allowed, leaving, reaches=reaches, keeping=keeping)
 
 
 def _up(height: float) -> Pose:

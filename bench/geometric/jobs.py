@@ -195,7 +195,7 @@ def made(
         PlanFailed: no path was found.
     """
     method = METHODS[name]
-    settings = {"motion": {"guide": method.guide}}
+    settings = settings_of_method(name)
     if method.planned:
         plan = _planner(name, scenario.part).plan(shown, scenario.joints, goal, obstacles, seed=scenario.index)
         if not plan.success:
@@ -206,8 +206,13 @@ def made(
 
 @cache
 def _planner(name: str, part: str) -> MotionPlanner:
-    method = METHODS[name]
-    return motion_planner(method.generator, robot().arm, holding(part), {"motion": {"guide": method.guide}})
+    return motion_planner(METHODS[name].generator, robot().arm, holding(part), settings_of_method(name))
+
+
+def settings_of_method(name: str) -> dict[str, Any]:
+    """Return the settings of a method's path generator: those that know constraints must keep them, or say so."""
+    keeping = {"keeping": "must"} if METHODS[name].generator == "screw" else {}
+    return {"motion": {"guide": METHODS[name].guide}, **keeping}
 
 
 def measured(scenario: GeometricScenario, name: str, shown: PosePath, aligned_from: float | None = None) -> Row:

@@ -14,9 +14,11 @@ from ..jit import inlined, inner, kernel
 from .escape_tree import grow_on, plant
 from .tree_arrays import DETOUR_LOG, GROWTH, NODE, OPTION
 
-FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT, PAUSED = 0, 1, 2, 3, 4, 5, 6, 7
+FREE, ESCAPED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_ESCAPE, TOO_LONG, NODE_LIMIT = 0, 1, 2, 3, 4, 5, 6
+GUIDED_BLOCKED, PAUSED = 7, 8
 """Status of an escape: the path was clear; detours were found; then the reasons of a failure. NODE_LIMIT: a tree was
-stopped while it still had open leaves. PAUSED: there is more to do."""
+stopped while it still had open leaves. GUIDED_BLOCKED: no detour ends before the object is guided along the path.
+PAUSED: there is more to do."""
 MIN_SLACK = 0.005
 """Least slack [m] of a root and of the pose where a detour rejoins, if an obstacle's own margin fills the shell."""
 
@@ -277,6 +279,8 @@ def escape(g, path, count, out, slacks, places, poses, branch, tree, cells, heap
         count, detour = int(growth[GROWTH.count]), int(growth[GROWTH.detour])
         if growth[GROWTH.growing] == 0.0 and not _begun(g, path, slacks, places, poses, options, enough, growth):
             return (ESCAPED if detour else FREE), count, detour
+        if growth[GROWTH.candidates] == 0.0:
+            return GUIDED_BLOCKED, count, detour
         root, size = int(growth[GROWTH.root]), int(growth[GROWTH.candidates])
         row, j, left = _grown(g, path[root], poses[:size], tree, cells, heap, options, state, growth, left)
         log[detour, DETOUR_LOG.tree_rows] = growth[GROWTH.rows]
@@ -310,8 +314,11 @@ def _begun(g, path, slacks, places, poses, options, enough, growth):
     if blocked < 0:
         return False
     _slacks(g, path, count, slacks, enough)
-    growth[GROWTH.root] = _root(slacks, blocked, enough)
-    growth[GROWTH.candidates] = _candidates(path, slacks, count, blocked, enough, most, places, poses)
+    growth[GROWTH.root], growth[GROWTH.candidates] = _root(slacks, blocked, enough), 0.0
+    # where the object is guided no detour may begin or end: that would leave the demonstrated way
+    last = count if options[OPTION.guided] <= 0.0 else count - int(options[OPTION.guided]) + 1
+    if blocked < last - 1:
+        growth[GROWTH.candidates] = _candidates(path, slacks, last, blocked, enough, most, places, poses)
     growth[GROWTH.growing], growth[GROWTH.attempt], growth[GROWTH.full] = 1.0, 0.0, 0.0
     growth[GROWTH.rows], growth[GROWTH.open] = 0.0, -1.0
     return True

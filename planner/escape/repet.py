@@ -25,6 +25,7 @@ from .detour import (
     ESCAPED,
     FREE,
     GOAL_IN_COLLISION,
+    GUIDED_BLOCKED,
     NO_ESCAPE,
     NODE_LIMIT,
     START_IN_COLLISION,
@@ -43,6 +44,7 @@ REASONS = {
     GOAL_IN_COLLISION: "goal in collision",
     NO_ESCAPE: "no escape found",
     NODE_LIMIT: "node limit reached",
+    GUIDED_BLOCKED: "blocked where the object is guided",
     TOO_LONG: "the detours do not fit into the longest path allowed",
 }
 """Reason for each status of an escape; "" for success."""
@@ -143,7 +145,7 @@ class RepetSettings:
             raise BadOption("shell", f"{self.shell} is not above the distance to keep, {self.distance}")
 
     def packed(self) -> np.ndarray:
-        """Return the options (32,) as the kernels take them, see `tree_arrays.OPTION`.
+        """Return the options (33,) as the kernels take them, see `tree_arrays.OPTION`.
 
         Column `largest_margin` holds `distance`; the user writes the largest margin of all obstacles.
         """
@@ -161,6 +163,7 @@ class RepetSettings:
             highest=highest,
             largest_margin=self.distance,
             on_shell=self.trigger == "shell",
+            guided=-1.0,
         )
 
 
@@ -238,6 +241,7 @@ def escape_path(
     *,
     masks: Sequence[int] = (),
     seed: int = 0,
+    guided: int | None = None,
 ) -> Escape:
     """Lead a path around obstacles; a clear path is returned unchanged, bit by bit.
 
@@ -249,6 +253,8 @@ def escape_path(
         settings: see `RepetSettings`.
         masks: per obstacle the capsules of the tool that may touch it, as bits of a number.
         seed: of the random children in retries; the same seed gives the same path.
+        guided: index of the pose from which on the object is guided along the path: no detour ends behind it; None:
+            detours may end anywhere. See `planner.imitation.constraint`.
 
     Raises:
         WrongType, BadShape, NotFinite: a path or obstacles of a wrong class, a tool that is not (m, 7) finite numbers.
@@ -268,6 +274,9 @@ def escape_path(
     options = settings.packed()
     margins = [settings.distance if o.margin is None else o.margin for o in obstacles]
     options[OPTION.largest_margin] = max([settings.distance, *margins])
+    if guided is not None:
+        check_count("guided", guided, f"[0, {len(path)}]")
+        options[OPTION.guided] = len(path) - guided
     buffers = [np.zeros((settings.longest, 8)) for _ in range(2)]
     buffers[0][: len(path)] = path.dqs
     tree, cells, heap = tree_arrays(settings.nodes, settings.levels)

@@ -65,7 +65,8 @@ class OptionColumns(NamedTuple):
     spacing: int = 29  # path length [m]
     shortcut: int = 30
     candidates: int = 31
-    width: int = 32
+    guided: int = 32  # number of last poses of the path that the object is guided along, without a detour; -1: none
+    width: int = 33
 
 
 class HeapColumns(NamedTuple):

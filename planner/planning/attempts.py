@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -12,11 +13,16 @@ from ..escape.detour import ESCAPED, FREE, GOAL_IN_COLLISION, NO_ESCAPE, NODE_LI
 from ..escape.repet import Corner, RepetSettings
 from ..geometry.pose import Pose
 from ..robot.arm import Arm
+from .closed_loop_motion import COUNT, Buffers
+from .joint_space_motion import path_deviation
+from .plan import Plan
 from .planning_scene import PlanningScene
 from .settings import PlanSettings
 
 NOTHING_KEPT = "nothing of the demonstration is kept"
 """Reason of a plan that would join the demonstrated path only at its end though some of it must be kept."""
+NOT_KEPT = "what the demonstration keeps is violated"
+"""Reason of a plan that would violate a constraint that must be kept."""
 
 
 class Attempt(NamedTuple):
@@ -87,3 +93,32 @@ def escape_detail(
     if status == NO_ESCAPE:
         return f"{rows} nodes in the last of {repet.retries + 1} trees"
     return f"the arm comes to a stop {gap(arm, goal, joints[-1])}"
+
+
+def better(one: Plan, other: Plan) -> Plan:
+    """Return the plan that keeps the constraint, has the feasible next motion, the larger share, the larger margin.
+
+    Args:
+        one: a plan.
+        other: the plan it is compared with.
+    """
+
+    def rank(plan: Plan) -> tuple[bool, bool, float, float]:
+        return plan.violation.kept, plan.next_feasible, round(plan.imitated_share, 1), plan.end_margin
+
+    return max((one, other), key=rank)
+
+
+def is_straight(arm: Arm, b: Buffers, max_deviation: float) -> bool:
+    """Return whether the tool has stayed near the path that it followed.
+
+    Args:
+        arm: the arm.
+        b: what a closed loop has left behind.
+        max_deviation: distance [m] from the path.
+    """
+    if math.isinf(max_deviation):
+        return True
+    joints = b.trace[: b.counts[COUNT.last] + 1]
+    path = np.vstack([arm.fk(joints[0]).dq, b.followed[: b.counts[COUNT.followed]]])
+    return path_deviation(arm, joints, path) <= max_deviation

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..escape.detour import ESCAPED, PAUSED, TOO_LONG, escape, last_tree, write_edge
 from ..escape.repet import RepetSettings
-from ..escape.tree_arrays import DETOUR_LOG, GROWTH, tree_arrays
+from ..escape.tree_arrays import DETOUR_LOG, GROWTH, OPTION, tree_arrays
 from ..geometry import screw
 from ..geometry.pose import METERS_PER_RADIAN
 from ..jit import inner, kernel
@@ -151,6 +151,8 @@ def lay_path(demo, goal, lead, fraction, spacing, b):
         return False
     _imitated(demo, (goal[0], goal[1], goal[2], goal[3], goal[4], goal[5], goal[6], goal[7]), b.imitated)
     guide = _guide(b.imitated, n, fraction) if n > 1 else 0
+    if b.options[OPTION.guided] > 0.0:
+        guide = min(guide, n - int(b.options[OPTION.guided]))
     at = _copied(lead, 0, len(lead), b.path, 0)
     at = write_edge(b.path, at, screw.load8(lead, len(lead) - 1), screw.load8(b.imitated, guide), spacing)
     counts[COUNT.imitated], counts[COUNT.guide] = n, guide

@@ -18,6 +18,7 @@ search in joint space was the last to fail, the reason is the search's.
 | no clear posture | all postures that a search in joint space found are in collision | part, obstacle, distance |
 | no path in joint space | a search in joint space found postures, but no path | number of postures |
 | nothing of the demonstration is kept | though the request asks for it, see `PlanRequest.must_keep` | the way found |
+| what the demonstration keeps is violated | though it must be kept | what would have to give, by how much |
 | an allowed contact is deeper on the way | than at the motion's ends, by more than 5 mm | |
 | no path to the goal joints | neither the tool's path nor a search in joint space leads there | number of searches |
 """
@@ -26,18 +27,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import checked_items, checked_kind
-from ..errors import BadOption, PlanFailed, WrongType
+from ..constraints.violation import NONE_VIOLATED, Violation
+from ..errors import BadOption, PlanFailed
 from ..escape.detour import GOAL_IN_COLLISION, START_IN_COLLISION
 from ..escape.repet import REASONS, EscapeTree
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle
+from ..imitation.constraint import Constraint, Keeping
 from ..imitation.demonstration import Demonstration
+from ..imitation.segment_path import segment_of
 from ..log.motion_log import MotionLog
 from ..resumable import Resumable, finished
 from ..robot.arm import Arm
@@ -84,6 +88,8 @@ class PlanRequest(NamedTuple):
         seed: of all random choices; the same seed gives the same plan.
         must_keep: a plan that keeps nothing of the demonstrated path behind the guiding pose is a failure: how things
             are moved matters, not only where they end.
+        constraint: what the demonstrated path keeps; None: what is found in it if the body holds something.
+        keeping: how it is kept, see `PlanSettings.keeping`; None: as the settings say.
     """
 
     demonstrated: PosePath
@@ -95,6 +101,8 @@ class PlanRequest(NamedTuple):
     next_motion: NextMotion | None = None
     seed: int = 0
     must_keep: bool = False
+    constraint: Constraint | None = None
+    keeping: Keeping | None = None
 
 
 def pose_goal(request: PlanRequest) -> Pose:
@@ -136,6 +144,8 @@ class Plan(NamedTuple):
         next_feasible: False if a required next motion cannot be followed from the end of the plan.
         reduction: largest weighted distance [m] of the demonstrated path from the poses of it that were planned with,
             see `planner.imitation.reduction`; 0: all of them were, see `RepetSettings.longest`.
+        constraint: what should be kept of the demonstrated path; None: nothing.
+        violation: how far the motion violates it; of a failed plan that of the best motion found, if there was one.
     """
 
     joints: np.ndarray
@@ -160,6 +170,8 @@ class Plan(NamedTuple):
     refined: tuple[str, ...] = ()
     next_feasible: bool = True
     reduction: float = 0.0
+    constraint: Constraint | None = None
+    violation: Violation = NONE_VIOLATED
 
     @property
     def success(self) -> bool:
@@ -172,6 +184,11 @@ class Plan(NamedTuple):
         return not self.request.must_keep or self.imitated_share > 0.0
 
     @property
+    def keeps_all(self) -> bool:
+        """True if something of the demonstrated path is kept, where it must be, and the constraint is, too."""
+        return self.keeps and self.violation.kept
+
+    @property
     def why(self) -> str:
         """Reason and detail in one line."""
         return f"{self.reason}: {self.detail}" if self.detail else self.reason
@@ -180,6 +197,11 @@ class Plan(NamedTuple):
     def end_margin(self) -> float:
         """Joint margin [rad] at the end."""
         return self.arm.margin(self.joints[-1])
+
+    def kept_along(self, path: PosePath) -> dict[str, Any]:
+        """Return what is kept along the last part of the plan's path, as arguments of `ReactivePlanner.go`."""
+        kept = None if self.constraint is None else self.constraint.ending(len(path))
+        return {"constraint": kept, "keeping": self.request.keeping}
 
     @property
     def goal_pose(self) -> Pose:
@@ -270,6 +292,8 @@ class MotionPlanner(ABC):
         next_motion: NextMotion | None = None,
         seed: int = 0,
         must_keep: bool = False,
+        constraint: Constraint | None = None,
+        keeping: Keeping | None = None,
     ) -> Plan:
         """Plan a motion.
 
@@ -284,6 +308,8 @@ class MotionPlanner(ABC):
             next_motion: the motion that follows, if it is known.
             seed: of all random choices; the same seed gives the same plan.
             must_keep: a plan that keeps nothing of the demonstration is a failure; see `PlanRequest.must_keep`.
+            constraint: what the demonstrated path keeps; None: what is found in it if the body holds something.
+            keeping: how it is kept, see `PlanSettings.keeping`; None: as the settings say.
 
         Returns:
             The plan; if it failed, its `reason` says why.
@@ -296,31 +322,7 @@ class MotionPlanner(ABC):
         """
         path = segment_of(demonstrated, segment)
         around, contacts = checked_items("obstacles", obstacles, Obstacle), checked_contacts(allowed)
-        request = PlanRequest(path, start, goal, around, contacts, leaving, next_motion, seed, must_keep)
+        request = PlanRequest(
+            path, start, goal, around, contacts, leaving, next_motion, seed, must_keep, constraint, keeping
+        )
         return self.answer(request)
-
-
-def segment_of(demonstrated: Demonstration | PosePath, segment: str | None = None) -> PosePath:
-    """Return the path of the tcp to imitate.
-
-    Args:
-        demonstrated: a demonstration, or a path, which is returned as it is.
-        segment: name of the demonstration's segment; None: its only one, or the whole path if it has none.
-
-    Raises:
-        WrongType: neither a demonstration nor a path.
-        BadOption: the demonstration has several segments and none is named, or `segment` is given with a path.
-        UnknownName: the demonstration has no segment of that name.
-    """
-    if isinstance(demonstrated, PosePath):
-        if segment is not None:
-            raise BadOption("segment", f"{segment!r} is given, but a path has no segments")
-        return demonstrated
-    if not isinstance(demonstrated, Demonstration):
-        raise WrongType("demonstrated", demonstrated, "a Demonstration or a PosePath")
-    if segment is not None:
-        return demonstrated.segment_path(segment)
-    names = [each.name for each in demonstrated.segments]
-    if len(names) > 1:
-        raise BadOption("segment", f"{demonstrated.name!r} has several: name one of {', '.join(names)}")
-    return demonstrated.segment_path(names[0]) if names else demonstrated.path

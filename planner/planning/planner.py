@@ -8,7 +8,6 @@ Not in the paper, which plans for the end effector's point.
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -16,44 +15,51 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import checked_kind, checked_settings
+from ..constraints.violation import violation_of
 from ..control.arm_arrays import arm_arrays
 from ..control.pursuit import ARRIVED
 from ..control.reachability import why_not_reached
 from ..escape.detour import ESCAPED
 from ..escape.repet import Corner
 from ..escape.tree_arrays import OPTION
-from ..geometry.pose import Pose
+from ..geometry.pose import Pose, PosePath
+from ..imitation.constraint import Constraint
 from ..imitation.tsia import imitated_path, imitated_share
 from ..ranges import ticks_of
 from ..resumable import SCENE, Resumable
 from ..robot.arm import Arm
 from ..robot.body import Body
 from ..robot.kinematics import FRAME, forward_into
-from .attempts import NOTHING_KEPT, Attempt, attempts, escape_detail
+from .attempts import NOT_KEPT, NOTHING_KEPT, Attempt, attempts, better, escape_detail, is_straight
 from .closed_loop_motion import COUNT, Buffers, ClosedLoop, buffers, closed_loop
+from .constrained_search import ConstrainedSearch
 from .joint_goal import line_to, plan_to_joints, tool_path
 from .joint_space_motion import (
     DEEP_CONTACT,
     IK_OR_LIMIT,
+    JointSpaceMotion,
     NextMotionCheck,
     SearchFailure,
-    path_deviation,
     plan_joint_space,
 )
 from .plan import WHY, MotionPlanner, Plan, PlanRequest
 from .planning_scene import PlanningScene, scene_template
-from .requests import checked_request, reduced_request, unfit
+from .requests import check_of, checked_request, constraint_of, keeping_of, reduced_request, unfit
 from .settings import PlanSettings
 
 
 class _Run(NamedTuple):
-    """An answer in the making: request, the arm among obstacles, its joints, its goal, the check of the next motion."""
+    """An answer in the making: request, the arm among obstacles, its joints, its goal, the check of the next motion.
+
+    And what is to be kept; None: nothing.
+    """
 
     request: PlanRequest
     scene: PlanningScene
     q: np.ndarray
     goal: Pose
     check: NextMotionCheck | None
+    constraint: Constraint | None
 
 
 class Planner(MotionPlanner):
@@ -79,11 +85,8 @@ class Planner(MotionPlanner):
         Raises:
             WrongType, BadModel: no body, or one of another arm.
         """
-        settings = self.settings
-        self._template = scene_template(
-            self.arm, checked_kind("body", body, Body), settings.safety, settings.motion.dt, settings.guard
-        )
-        self.body = body
+        self.body, settings = checked_kind("body", body, Body), self.settings
+        self._template = scene_template(self.arm, body, settings.safety, settings.motion.dt, settings.guard)
 
     def answering(self, request: PlanRequest) -> Resumable[Plan]:
         """Plan a motion in slices; a failed plan says why.
@@ -105,7 +108,8 @@ class Planner(MotionPlanner):
         scene = PlanningScene(self._template, request.obstacles, self.settings.repet.distance, request.allowed)
         to = request.goal
         pose = to if isinstance(to, Pose) else self.arm.fk(to)
-        run = _Run(request, scene, q, pose, self._check_of(scene, request))
+        constraint = constraint_of(request, self.settings, Pose(self._pose(q)), holds=bool(self.body.held))
+        run = _Run(request, scene, q, pose, check_of(self._template, scene, request, self.settings), constraint)
         reason, detail = unfit(self.arm, scene, request, self.settings)
         if reason:
             return self._failed(run, reason, detail)
@@ -116,10 +120,12 @@ class Planner(MotionPlanner):
             plan = yield from self._to_joints(run, np.asarray(to), lead)
             return plan._replace(tries=1)
         best, tries = yield from self._followed(run, lead, request.seed)
-        if not (best.success and best.next_feasible and best.end_margin >= self.settings.end_margin and best.keeps):
+        if not (best.success and best.next_feasible and best.end_margin >= self.settings.end_margin and best.keeps_all):
             best = yield from self._searched(run, best, request.seed)
         if best.success and not best.keeps:
             best = self._failed(run, NOTHING_KEPT, f"found was: {best.how}", tried=True)
+        if best.success and not best.violation.kept and keeping_of(request, self.settings) == "must":
+            best = self._failed(run, NOT_KEPT, best.violation.detail, tried=True)._replace(violation=best.violation)
         if best.reason == IK_OR_LIMIT and not best.detail:
             best = best._replace(detail=why_not_reached(self.arm, pose, q))
         return best._replace(tries=tries)
@@ -145,14 +151,14 @@ class Planner(MotionPlanner):
             status, pursuit, margin = yield from self._closed_loop(run, lead, attempt, seed)
             escapes.append(status)
             trace = self._buffers.trace[: self._buffers.counts[COUNT.last] + 1]
-            arrived = pursuit == ARRIVED and self._is_straight()
+            arrived = pursuit == ARRIVED and is_straight(self.arm, self._buffers, self.settings.max_deviation)
             if arrived and run.scene.keeps_contacts(trace):
                 # also where the tool is too close for a detour: the safety layer has proven every step
                 found = self._plan(run, "escape" if status == ESCAPED else "direct", margin, attempt)
                 found = found._replace(next_feasible=(yield from self._next_is_feasible(run, found.joints[-1])))
-                if self._is_good(found) or self.settings.effort == 0:
+                if self._is_good(found) or (self.settings.effort == 0 and found.violation.kept):
                     return found, len(escapes)
-                best = found if best is None else _better(best, found)
+                best = found if best is None else better(best, found)
             elif failed is None:
                 rows, repet = int(self._buffers.counts[COUNT.tree_rows]), self.settings.repet
                 why = "the safety layer leads the tool off the path"
@@ -167,8 +173,20 @@ class Planner(MotionPlanner):
     def _searched(self, run: _Run, best: Plan, seed: int) -> Resumable[Plan]:
         """Return the better of the given plan and a joint-space plan; without either, why the search failed."""
         settings = self.settings
-        if settings.search is None or (best.success and best.keeps and settings.effort == 0):
+        if settings.search is None or (best.success and best.keeps_all and settings.effort == 0):
             return best
+        if run.constraint is not None:
+            kept = yield from ConstrainedSearch(
+                self.arm, run.scene, self._work, run.request.demonstrated, run.goal, run.q, run.constraint, settings,
+                run.check, seed,
+            ).run()  # fmt: skip
+            if not isinstance(kept, SearchFailure):
+                plan = self._through_joints(run, kept)
+                best = better(best, plan) if best.success else plan
+            elif not best.success and keeping_of(run.request, settings) == "must":
+                return best._replace(reason=kept.reason, detail=kept.detail)
+            if best.success:
+                return best
         if best.success and best.next_feasible and best.keeps:
             rounds = min(settings.search.rounds, settings.effort)
             settings = replace(settings, search=replace(settings.search, rounds=rounds))
@@ -186,8 +204,13 @@ class Planner(MotionPlanner):
         )
         if isinstance(found, SearchFailure):
             return best if best.success else best._replace(reason=found.reason, detail=found.detail)
-        imitated = imitated_path(run.request.demonstrated, run.goal)
-        plan = self._made(
+        plan = self._through_joints(run, found)
+        return better(best, plan) if best.success else plan
+
+    def _through_joints(self, run: _Run, found: JointSpaceMotion) -> Plan:
+        """Return the plan of a motion found by a search."""
+        imitated, settings = imitated_path(run.request.demonstrated, run.goal), self.settings
+        return self._made(
             run,
             joints=found.joints,
             how="joint search",
@@ -198,14 +221,13 @@ class Planner(MotionPlanner):
             imitated_share=imitated_share(imitated.dqs, found.path.dqs, settings.motion.guide),
             next_feasible=found.next_feasible or run.check is None or not run.check.required,
         )
-        return _better(best, plan) if best.success else plan
 
     def _to_joints(self, run: _Run, goal: np.ndarray, lead: np.ndarray) -> Resumable[Plan]:
         """Return a plan to goal joints: along the demonstration if it ends beside them, else by a search."""
         settings, seed = self.settings, run.request.seed
         attempt = Attempt(settings.motion.guide, settings.biases[0], detours=False)
         _, pursuit, margin = yield from self._closed_loop(run, lead, attempt, seed)
-        if pursuit == ARRIVED and self._is_straight():
+        if pursuit == ARRIVED and is_straight(self.arm, self._buffers, self.settings.max_deviation):
             found = self._plan(run, "direct", margin, attempt)
             rest = line_to(self.arm, run.scene, found.joints[-1], goal, settings)
             if rest is not None:
@@ -236,25 +258,8 @@ class Planner(MotionPlanner):
 
     def _is_good(self, plan: Plan) -> bool:
         share, margin = self.settings.min_imitated_share, self.settings.end_margin
-        return plan.imitated_share >= share and plan.end_margin >= margin and plan.next_feasible
-
-    def _is_straight(self) -> bool:
-        """True if the tool has stayed within `max_deviation` of the path that it followed."""
-        b, counts, max_deviation = self._buffers, self._buffers.counts, self.settings.max_deviation
-        if math.isinf(max_deviation):
-            return True
-        joints = b.trace[: counts[COUNT.last] + 1]
-        path = np.vstack([self._pose(joints[0]), b.followed[: counts[COUNT.followed]]])
-        return path_deviation(self.arm, joints, path) <= max_deviation
-
-    def _check_of(self, scene: PlanningScene, request: PlanRequest) -> NextMotionCheck | None:
-        next_motion = request.next_motion
-        if next_motion is None:
-            return None
-        if next_motion.required:
-            distance = self.settings.repet.distance
-            scene = PlanningScene(self._template, request.obstacles, distance, next_motion.allowed)
-        return NextMotionCheck(scene, next_motion.path, next_motion.required)
+        good = plan.imitated_share >= share and plan.end_margin >= margin
+        return good and plan.next_feasible and plan.violation.kept
 
     def _next_is_feasible(self, run: _Run, q: np.ndarray) -> Resumable[bool]:
         """True if a required next motion can be followed from joints q."""
@@ -276,6 +281,8 @@ class Planner(MotionPlanner):
         b.options[OPTION.largest_margin] = run.scene.widest(attempt.factor)
         if attempt.early:
             b.options[OPTION.candidates] = 1.0
+        if run.constraint is not None:
+            b.options[OPTION.guided] = run.constraint.count - run.constraint.guided
         if not (self.settings.trees and attempt.detours):
             b.options[OPTION.rounds] = 0.0
         b.state[0] = float(seed % 2147483646) + 1.0
@@ -306,24 +313,17 @@ class Planner(MotionPlanner):
         b, counts = self._buffers, self._buffers.counts if tried else np.zeros(COUNT.width, dtype=np.int64)
         path = b.path[: counts[COUNT.full]].copy() if counts[COUNT.full] else run.request.demonstrated.dqs
         return self._made(
-            run,
-            joints=run.q[None],
-            reason=reason,
-            detail=detail,
-            imitated_poses=run.request.demonstrated.dqs,
-            path_poses=path,
-            tree_rows=b.tree[: counts[COUNT.tree_rows]].copy(),
-            margin=-np.inf,
-            imitated_share=0.0,
-        )
+            run, joints=run.q[None], reason=reason, detail=detail, imitated_poses=run.request.demonstrated.dqs,
+            path_poses=path, tree_rows=b.tree[: counts[COUNT.tree_rows]].copy(), margin=-np.inf, imitated_share=0.0,
+        )  # fmt: skip
 
     def _made(self, run: _Run, **found: Any) -> Plan:
         """Return a plan of the given values and of those that all plans of this planner share."""
         empty = {"reason": "", "how": "", "tree_rows": self._buffers.tree[:0], "detours": 0, "changed": 0}
         same = {"arm": self.arm, "body": self.body, "settings": self.settings, "dt": self.settings.motion.dt}
+        if run.constraint is not None:
+            same["constraint"] = run.constraint
+            if not found.get("reason"):
+                motion = PosePath(np.array([self._pose(q) for q in found["joints"]]))
+                same["violation"] = violation_of(run.constraint, PosePath(found["imitated_poses"]), motion)
         return Plan(**{**empty, **same, "request": run.request, "tries": 0, "seconds": 0.0, **found})
-
-
-def _better(one: Plan, other: Plan) -> Plan:
-    """Return the plan with the feasible next motion, then the larger imitated share, then the larger end margin."""
-    return max((one, other), key=lambda plan: (plan.next_feasible, round(plan.imitated_share, 1), plan.end_margin))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..collision.edge_certificates import is_clear
 from ..control.arm_arrays import arm_arrays
 from ..control.pursuit import ARRIVED
+from ..control.time_optimal import time_optimal
 from ..errors import PlanFailed
 from ..geometry.pose import Pose, PosePath
 from ..geometry.smooth_path import smooth, thinned
@@ -23,7 +24,6 @@ from ..safety.guarded_pursuit import roll_out
 from ..search.joint_space_rrt import joint_edge_is_clear
 from .plan import Plan, check_success
 from .planning_scene import PlanningScene
-from .time_optimal import time_optimal
 
 ACCELERATION = 5.0
 """Default limit of the joints' acceleration [rad/s^2]: about a third of what a Panda can do."""

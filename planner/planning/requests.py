@@ -7,18 +7,21 @@ import math
 import numpy as np
 
 from ..arrays import checked_kind
+from ..constraints.request_constraint import fitted, remembered_constraint
 from ..control.reachability import why_not_reached
 from ..errors import BadOption, told_apart
 from ..geometry.pose import METERS_PER_RADIAN, Pose, PosePath
+from ..imitation.constraint import KEEPING, Constraint, Keeping
 from ..imitation.reduction import reduced
-from ..ranges import check_count
+from ..imitation.tsia import imitated_path
+from ..ranges import check_choice, check_count
 from ..robot.arm import Arm
 from ..robot.joint_limits import beyond_limit, within_limits
 from ..safety.robot_checks import checked_contacts
 from .joint_goal import checked_goal
-from .joint_space_motion import IK_OR_LIMIT
+from .joint_space_motion import IK_OR_LIMIT, NextMotionCheck
 from .plan import NextMotion, PlanRequest
-from .planning_scene import PlanningScene, checked_obstacles
+from .planning_scene import PlanningScene, SceneTemplate, checked_obstacles
 from .settings import PlanSettings
 
 LEAVING_TOLERANCE = 0.01
@@ -51,6 +54,12 @@ def checked_request(request: PlanRequest, arm: Arm) -> PlanRequest:
         checked_kind("next_motion", then, NextMotion)
         checked_kind("next_motion.path", then.path, PosePath)
         then = then._replace(allowed=checked_contacts(then.allowed, "next_motion.allowed"))
+    if request.constraint is not None:
+        count = checked_kind("constraint", request.constraint, Constraint).count
+        if count != len(request.demonstrated):
+            raise BadOption("constraint", f"is of a path of {count} poses; the path has {len(request.demonstrated)}")
+    if request.keeping is not None:
+        check_choice("keeping", request.keeping, KEEPING)
     start = within_limits(arm, arm.checked(request.start))
     if request.leaving is not None:
         _check_leaving(arm, start, checked_kind("leaving", request.leaving, PosePath))
@@ -76,9 +85,13 @@ def reduced_request(request: PlanRequest, most: int) -> tuple[PlanRequest, float
         short enough.
     """
     demonstrated, deviation = reduced(request.demonstrated, most)
+    constraint = request.constraint
+    if constraint is not None and len(demonstrated) < constraint.count:
+        constraint = constraint.of_lengths(request.demonstrated.lengths(), demonstrated.lengths())
     leaving, then = request.leaving, request.next_motion
     return request._replace(
         demonstrated=demonstrated,
+        constraint=constraint,
         leaving=None if leaving is None else reduced(leaving, most).path,
         next_motion=None if then is None else then._replace(path=reduced(then.path, most).path),
     ), deviation
@@ -123,3 +136,51 @@ def _check_leaving(arm: Arm, start: np.ndarray, leaving: PosePath) -> None:
             f"{found} mm, a radian counted as {METERS_PER_RADIAN:g} m; allowed are {most}"
         )
         raise BadOption("leaving", reason)
+
+
+def keeping_of(request: PlanRequest, settings: PlanSettings) -> Keeping:
+    """Return how a constraint is kept.
+
+    Args:
+        request: the request.
+        settings: of the planner.
+    """
+    return settings.keeping if request.keeping is None else request.keeping
+
+
+def constraint_of(request: PlanRequest, settings: PlanSettings, start: Pose, *, holds: bool) -> Constraint | None:
+    """Return what is to be kept of the demonstrated path, at this start and goal; None: nothing.
+
+    Args:
+        request: a checked request.
+        settings: of the planner.
+        start: pose of the tcp at the start.
+        holds: whether the body holds something: without, only a given constraint is kept.
+    """
+    found, given = request.constraint, request.demonstrated
+    if keeping_of(request, settings) == "free" or not isinstance(request.goal, Pose):
+        return None
+    if found is None and holds:
+        found = remembered_constraint(given, settings.constraint)
+    if found is None or found.keeps_nothing:
+        return None
+    return fitted(found, imitated_path(given, request.goal), start)
+
+
+def check_of(
+    template: SceneTemplate, scene: PlanningScene, request: PlanRequest, settings: PlanSettings
+) -> NextMotionCheck | None:
+    """Return the check of the motion that follows; None: there is none.
+
+    Args:
+        template: the arm and its body.
+        scene: the arm among the obstacles, with the contacts of this motion.
+        request: a checked request.
+        settings: of the planner.
+    """
+    then = request.next_motion
+    if then is None:
+        return None
+    if then.required:
+        scene = PlanningScene(template, request.obstacles, settings.repet.distance, then.allowed)
+    return NextMotionCheck(scene, then.path, then.required)

@@ -10,7 +10,8 @@ from ..control.controller import ControllerSettings
 from ..control.pursuit import PursuitSettings
 from ..errors import BadOption
 from ..escape.repet import Corner, RepetSettings
-from ..ranges import check_counts, check_ranges, ticks_of
+from ..imitation.constraint import KEEPING, ConstraintSettings, Keeping
+from ..ranges import check_choice, check_counts, check_ranges, ticks_of
 from ..safety.safety_layer import SafetySettings
 
 
@@ -112,6 +113,9 @@ class PlanSettings:
         trees: False: no escape trees, so no detours of the tool. Without search too, the safety layer is alone.
         max_deviation: distance [m] by which the safety layer may lead the tool off its path.
         guard: False: no safety layer; a successful plan is then proven clear for the tool at most.
+        constraint: tolerances of what is kept while something is carried.
+        keeping: "must" (a plan that does not keep it fails), "prefer" (such a plan is taken where none is found that
+            keeps it, and says what gave way), "free" (nothing is kept but by imitation).
     """
 
     motion: MotionSettings = field(default_factory=MotionSettings)
@@ -130,6 +134,8 @@ class PlanSettings:
     trees: bool = field(default=True, metadata={"formerly": "avoid"})
     max_deviation: float = field(default=math.inf, metadata={"formerly": "stray"})
     guard: bool = True
+    constraint: ConstraintSettings = field(default_factory=ConstraintSettings)
+    keeping: Keeping = "prefer"
 
     def __post_init__(self):
         checked_kind("motion", self.motion, MotionSettings)
@@ -137,6 +143,8 @@ class PlanSettings:
         checked_kind("safety", self.safety, SafetySettings)
         if self.search is not None:
             checked_kind("search", self.search, JointSearchSettings)
+        checked_kind("constraint", self.constraint, ConstraintSettings)
+        check_choice("keeping", self.keeping, KEEPING)
         check_ranges(self, "(0, 1]", "tight")
         check_ranges(self, "[0, 1]", "min_imitated_share")
         check_ranges(self, "[0, inf]", "end_margin")

@@ -5,8 +5,8 @@ Not in the paper, which plans at the present place of an obstacle.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Situation(NamedTuple):
         allowed: returns the allowed contacts that exist among given obstacles.
         detours: whether going round is an option.
         seed: of the plans of detours.
+        kept: what their requests say of what the demonstration keeps.
     """
 
     q: np.ndarray
@@ -50,6 +51,7 @@ class Situation(NamedTuple):
     allowed: Callable[[Sequence[Obstacle]], list[tuple[str, str]]]
     detours: bool
     seed: int
+    kept: Mapping[str, Any]
 
 
 class Decision(NamedTuple):
@@ -101,7 +103,7 @@ def _detour(now: Situation, planner: Planner, start: float, end: float) -> Resum
     around = still + places
     if len(around) > MAX_OBSTACLES:
         return None
-    request = PlanRequest(now.rest, now.q, goal, tuple(around), tuple(now.allowed(around)), seed=now.seed)
+    request = PlanRequest(now.rest, now.q, goal, tuple(around), tuple(now.allowed(around)), seed=now.seed, **now.kept)
     plan = yield from planner.answering(request)
     return plan if plan.how == "escape" else None
 

@@ -15,11 +15,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
+from typing import Any
 
 import numpy as np
 
 from ..control.pursuit import PursuitSettings, fresh_pursuit_state
 from ..geometry.pose import PosePath
+from ..imitation.constraint import Constraint, Keeping
 from ..planning.attempts import NOTHING_KEPT
 from ..planning.plan import NextMotion
 from ..planning.planning_scene import Tightest
@@ -52,6 +54,8 @@ class MotionState:
         detours: False: along the path or not at all.
         next_motion: the motion that follows, if it is known.
         must_keep: new plans must keep some of the path, see `PlanRequest.must_keep`.
+        constraint: what the nominal path keeps; None: what is found in it if the hand holds something.
+        keeping: how it is kept, see `PlanRequest.keeping`.
         plan_now: the next tick plans round the standing obstacles.
         mode: see the module.
         path: the path that is followed: (a part of) the nominal one, or a detour.
@@ -75,6 +79,8 @@ class MotionState:
     detours: bool = True
     next_motion: NextMotion | None = None
     must_keep: bool = False
+    constraint: Constraint | None = None
+    keeping: Keeping | None = None
     plan_now: bool = False
     mode: Mode = Mode.PURSUING
     path: PosePath = field(init=False)
@@ -100,6 +106,11 @@ class MotionState:
     def over(self) -> bool:
         """True if the motion is done or has failed."""
         return self.mode in (Mode.DONE, Mode.FAILED)
+
+    def kept_from(self, index: int) -> dict[str, Any]:
+        """Return what plans of the nominal path must keep from a pose on, as arguments of `MotionPlanner.plan`."""
+        kept = None if self.constraint is None else self.constraint.part(index, self.constraint.count)
+        return {"must_keep": self.must_keep, "constraint": kept, "keeping": self.keeping}
 
     def pursue(self, path: PosePath, *, detour: bool) -> None:
         """Follow a path from its beginning.

@@ -16,10 +16,12 @@ from numpy.typing import ArrayLike
 
 from ..arrays import checked_kind, checked_settings
 from ..collision.step_certificates import near_pair_slack
+from ..constraints.request_constraint import remembered_constraint
 from ..control.arm_arrays import ARM, PURSUIT_STATE, arm_arrays
 from ..control.pursuit import ARRIVED
 from ..geometry.pose import PosePath, nearest
 from ..geometry.shapes import Obstacle, moves
+from ..imitation.constraint import Constraint, Keeping
 from ..imitation.reduction import reduced
 from ..planning.joint_space_motion import MAX_DEVIATION, path_deviation
 from ..planning.plan import NextMotion, Plan, PlanRequest, check_success
@@ -101,32 +103,31 @@ class ReactivePlanner:
             self._scene.move(self._ahead())
 
     def go(
-        self,
-        path: PosePath,
-        *,
-        exact: bool = True,
-        next_motion: NextMotion | None = None,
-        detours: bool = True,
-        must_keep: bool = False,
-    ) -> None:
+        self, path: PosePath, *, exact: bool = True, next_motion: NextMotion | None = None, detours: bool = True,
+        must_keep: bool = False, constraint: Constraint | None = None, keeping: Keeping | None = None,
+    ) -> None:  # fmt: skip
         """Follow a path to its end, joined from wherever the arm is.
 
         Args:
             path: of the tcp; of very long paths poses at even steps of their length, see `RepetSettings.longest`.
             exact: False: done as soon as the tool is within reach of the end.
             next_motion: the motion that follows: where there is a choice, the path ends in a posture that suits it.
-            detours: False: along the path or not at all, without detour or search; where the safety layer leads away
-                from the path, the arm stands still, if it can.
+            detours: False: along the path or not at all; where the safety layer leads off it, the arm stands still.
             must_keep: new plans must keep some of the path, see `PlanRequest.must_keep`.
+            constraint: what the path keeps; None: what is found in it if the hand holds something.
+            keeping: how it is kept, see `PlanRequest.keeping`.
         """
         checked_kind("path", path, PosePath)
         if next_motion is not None:
             checked_kind("next_motion", next_motion, NextMotion)
-        path = reduced(path, max(self.settings.plan.repet.longest, 2)).path
-        packed = pursuit_of(self.settings.plan.motion.pursuit, exact=exact).packed()
-        self._work[ARM.pursuit, : len(packed)] = packed
-        plan_now = bool(self._obstacles) and detours
-        self.motion = MotionState(path, detours, next_motion, must_keep, plan_now=plan_now)
+        given, path = path, reduced(path, max(self.settings.plan.repet.longest, 2)).path
+        if constraint is not None or self.body.held:
+            constraint = constraint or remembered_constraint(given, self.settings.plan.constraint)
+            constraint = constraint.of_lengths(given.lengths(), path.lengths())
+        pursuit = pursuit_of(self.settings.plan.motion.pursuit, exact=exact).packed()
+        self._work[ARM.pursuit, : len(pursuit)] = pursuit
+        now = bool(self._obstacles) and detours
+        self.motion = MotionState(path, detours, next_motion, must_keep, constraint, keeping, plan_now=now)
 
     def follow(self, plan: Plan, *, exact: bool = True) -> None:
         """Follow the path of a plan to its end.
@@ -207,10 +208,10 @@ class ReactivePlanner:
     def _decide(self, motion: MotionState, q: np.ndarray) -> None:
         """Go on deciding what to do about moving obstacles; meanwhile the arm does as decided before."""
         if motion.decided is None:
-            rest = motion.nominal[self._now_at(motion, q) :]
+            rest = motion.nominal[(at := self._now_at(motion, q)) :]
             now = Situation(
                 q.copy(), self._scene.robot.copy(), motion.path, motion.pursuit.copy(), rest, self._obstacles,
-                self._template, self._known_allowed, motion.detours, motion.tries,
+                self._template, self._known_allowed, motion.detours, motion.tries, motion.kept_from(at),
             )  # fmt: skip
             motion.decided = Paced(decide(now, self._foresight, self._quick, self.settings.horizon))
         if not motion.decided.advance(self.settings.budget):
@@ -264,12 +265,11 @@ class ReactivePlanner:
         waited = motion.pursuit[PURSUIT_STATE.waited]
         if waited > self.settings.patience:
             motion.stalled += waited
-            # an obstacle that stands still at the goal will not leave it; without detours a new plan changes nothing
+            # a still obstacle at the goal will not leave it; without detours a new plan changes nothing
             hopeless = (not self._moving or not motion.detours) and motion.tries >= 3
             hopeless |= not self._moving and motion.refusal[0] == "goal in collision"
             if hopeless or motion.stalled > self.settings.give_up:
-                tight, distance = self._scene.tightest_seen(), self.settings.plan.safety.distance
-                motion.fail(*why_stalled(motion, tight, distance))
+                motion.fail(*why_stalled(motion, self._scene.tightest_seen(), self.settings.plan.safety.distance))
                 return self._stand_still(q)
             motion.tries += 1
             motion.pursuit[PURSUIT_STATE.waited] = 0.0
@@ -285,8 +285,8 @@ class ReactivePlanner:
         motion.reached = self._now_at(motion, q)
         rest = motion.nominal[motion.reached :]
         around, allowed = tuple(obstacles), tuple(self._known_allowed(obstacles))
-        then, keep = motion.next_motion, motion.must_keep
-        request = PlanRequest(rest, q, rest[-1], around, allowed, None, then, motion.tries, keep)
+        then, kept = motion.next_motion, motion.kept_from(motion.reached)
+        request = PlanRequest(rest, q, rest[-1], around, allowed, None, then, motion.tries, **kept)
         plan = yield from self._planner.answering(request)
         motion.refusal = plan.reason, plan.detail
         if plan.success and plan.how == "joint search":

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from ..geometry.pose import Pose, PosePath
+from ..imitation.constraint import Keeping
 
 Kind = Literal["reach", "lift", "carry", "slide", "articulate", "leave", "withdraw"]
 START = ""
@@ -59,6 +60,7 @@ class Phase:
         straight: distance [m] of the hand from where a motion begins up to which there are no detours.
         clearance: margin [m] of objects in the motion `before`, if there is room; 0: that of all motions.
         must_keep: whether something of the path must be kept on any way: a full glass is not tilted otherwise.
+        keeping: how the constraint of the path is kept, see `PlanRequest.keeping`; None: as the settings say.
         round: whether thing and reference are round and stand: their yaws mean nothing.
         anchor: point of the thing whose pose `goals` are, in shares of its half size; its middle by default.
         reference_anchor: point of the reference that they are relative to, likewise.
@@ -91,6 +93,7 @@ class Phase:
     straight: float = 0.0
     clearance: float = 0.0
     must_keep: bool = False
+    keeping: Keeping | None = None
     round: bool = False
     anchor: Anchor = (0.0, 0.0, 0.0)
     reference_anchor: Anchor = (0.0, 0.0, 0.0)

@@ -19,13 +19,13 @@ from onedemo import planner as face
 from onedemo.planner import errors
 from onedemo.planner.control.inverse_kinematics import inverse_kinematics, nearest_reached
 from onedemo.planner.control.pursuit import Pursuit
+from onedemo.planner.control.time_optimal import time_optimal
 from onedemo.planner.escape.repet import clear_of, point_tool
 from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry.smooth_path import SmoothPath, smooth
 from onedemo.planner.imitation.bimanual import relative_jacobian
 from onedemo.planner.imitation.tsia import screw_path
 from onedemo.planner.planning.planning_scene import PlanningScene
-from onedemo.planner.planning.time_optimal import time_optimal
 from onedemo.planner.robot.body import Hull
 
 HALF = np.sqrt(0.5)

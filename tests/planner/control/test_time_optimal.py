@@ -8,8 +8,8 @@ from helpers.strategies import for_all
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
+from onedemo.planner.control.time_optimal import time_optimal
 from onedemo.planner.errors import BadOption, BadShape, NotFinite
-from onedemo.planner.planning.time_optimal import time_optimal
 
 seeds = st.integers(0, 10**6)
 KINDS = ("anywhere", "walk", "curve", "line", "there and back")
