@@ -60,7 +60,8 @@ def found_constraint(
         return keeps(guided=0)
     held = _held_until(up, settings)
     if held == 0:
-        return keeps(directions=_curve(up), bound=settings.angle)
+        spread = min(_detour(up), settings.held)
+        return keeps(directions=_curve(up), spread=spread, bound=spread + settings.angle)
     center, spread = smallest_cap(up[: held + 1])
     guided = count
     if held < len(up) - 1:
@@ -140,6 +141,18 @@ def _held_until(up: np.ndarray, settings: ConstraintSettings) -> int:
     inside = angles_to(up[: end + 1], up[0]).max() / end
     outside = angles_to(up[end:], up[end]).max() / (last - end)
     return end if inside < settings.slower * outside else 0
+
+
+def _detour(up: np.ndarray) -> float:
+    """Largest angle [rad] of the vertical's curve from the shortest turn between its ends: so freely it was turned."""
+    ends = up[[0, -1]] / np.linalg.norm(up[[0, -1]], axis=1, keepdims=True)
+    shares = np.linspace(0.0, 1.0, len(up))[:, None]
+    turn = (1.0 - shares) * ends[0] + shares * ends[1]
+    lengths = np.linalg.norm(turn, axis=1, keepdims=True)
+    if lengths.min() < 1e-6:
+        return math.inf
+    turn = turn / lengths
+    return float(np.min([angles_to(up, each) for each in turn], axis=0).max())
 
 
 def _curve(up: np.ndarray) -> np.ndarray:

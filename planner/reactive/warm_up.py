@@ -13,13 +13,19 @@ from math import inf
 
 import numpy as np
 
+from ..constraints.constrained_rrt import connect_keeping, shorten_keeping
+from ..constraints.guided_postures import FLOOD, PARTS, edge_along, spread_back
+from ..constraints.held_directions import packed_constraint
+from ..constraints.violation import violation_of
 from ..control.arm_arrays import arm_arrays
 from ..control.controller import Controller
 from ..geometry import dualquat as dq
 from ..geometry.pose import Pose, PosePath
 from ..geometry.shapes import Obstacle, Sphere
+from ..imitation.kept_components import found_constraint
 from ..imitation.segmentation import resampled
 from ..imitation.tsia import final_path, imitated_path, screw_path
+from ..planning.constrained_search import ConstrainedSearch
 from ..planning.joint_space_motion import plan_joint_space
 from ..planning.planning_scene import PlanningScene
 from ..planning.settings import JointSearchSettings, PlanSettings
@@ -106,3 +112,21 @@ def _search(arm: Arm, point: Body, q: np.ndarray) -> None:
         arm_arrays(arm, motion.controller.packed(), motion.pursuit.packed()),
     )
     finished(plan_joint_space(arm, scene, work, PosePath(here.dq[None]), here, q, SHORT, None, 0))
+    _keep(arm, scene, work, q)
+
+
+def _keep(arm: Arm, scene: PlanningScene, work: np.ndarray, q: np.ndarray) -> None:
+    """Find a constraint, and compile its searches and measures; nothing need be found."""
+    path = _upwards(arm.fk(q))
+    found = replace(found_constraint(path), guided=len(path) // 2)
+    violation_of(found, path, path)
+    search = ConstrainedSearch(arm, scene, work, path, path[-1], q, found, SHORT, None, 0)
+    finished(search.run())
+    kept, state, rows = packed_constraint(found), np.ones(1), np.array([q, q, q, q])
+    trees, parents, counts = np.array([rows, rows]), np.full((2, 4), -1.0), np.ones(2)
+    options, scratch, solver = np.zeros(FLOOD.width), np.empty((PARTS, arm.dof)), work.copy()
+    out, nodes, links, numbers = np.empty((8, arm.dof)), np.array([rows, rows]), np.zeros((2, 4)), np.ones(2)
+    connect_keeping(scene.seen, solver, kept, q - 0.1, q + 0.1, trees, parents, counts, 0, 1, 0.1, state, out)
+    shorten_keeping(scene.seen, solver, kept, out, 2, 1, state, rows[:2])
+    spread_back(scene.seen, solver, path.dqs[:2], 1, 0, nodes, links, numbers, 0, 1, options, state, scratch)
+    edge_along(scene.seen, solver, q, q.copy(), scratch, rows[0])
