@@ -18,8 +18,6 @@ from . import spaces as space
 if TYPE_CHECKING:
     pass
 
-FREQUENCY = 20
-"""Default action frequency [Hz]."""
 HORIZON = 150
 """Actions per episode."""
 LAST_ACTION = "last_action"

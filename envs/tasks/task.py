@@ -23,8 +23,6 @@ TAKEN = re.compile(r"table|fingers|hand|held|world|floor|(robot|gripper|obstacle
 """Names of things that the scene has already."""
 TABLE_EDGE = 0.36
 """Largest |x| and |y| of a nominal place on the table [m]."""
-FREQUENCY = 50
-"""Default action frequency [Hz]."""
 
 
 @dataclass(frozen=True, eq=False)
