@@ -10,7 +10,7 @@ from ...planner.skills.skill import THING, SegmentedSkill, SegmentMeaning
 
 SLOW = {"speed": 0.5}
 NEAR = {"touch_within": 0.02}
-POURED = {"must_keep": True, "keeping": "must", "tries": 3, "pause": "drain"}
+POURED = {"must_keep": True, "keeping": "free", "tries": 3, "pause": "drain"}
 APPROACH = SegmentMeaning(
     "approach",
     "reach",
