@@ -110,8 +110,8 @@ class SkillMotions:
 
     def reaching(self, phase: Phase) -> MotionChoice:
         """Return the motion of the hand to where it moves a thing, or has done what it should."""
-        at = self.reference(phase)
-        return self._motion(phase, self.paths[phase.name], [at @ end for end in self._ends[phase.name]])
+        goals = [self.reference(phase) @ end for end in self._ends[phase.name]]
+        return self._motion(phase, self.paths[phase.name], goals)
 
     def fetching(self, step: Transfer, way: Way = AS_SHOWN) -> MotionChoice:
         """Return the motion to all grasps that look alike, and on from each of them if there are several.
@@ -174,8 +174,8 @@ class SkillMotions:
     def rising(self, lift: Phase) -> PosePath:
         """Return a path straight up by the height of a lift."""
         path, here = self.paths[lift.name], self.executor.arm.fk(self.executor.q)
-        height = path[-1].position[2] - path[0].position[2]
-        return screw_path(here, _up(height) @ here, self.settings.resample)
+        rise = path[-1].position[2] - path[0].position[2]
+        return screw_path(here, _up(rise) @ here, self.settings.resample)
 
     def placing(
         self, carry: Phase, held: Pose, *, lift: bool = False, tail: float = math.inf,
@@ -192,8 +192,8 @@ class SkillMotions:
             clearance: margin [m] of objects in the part that is free.
         """
         at, tool = self.reference(carry), self._tool(carry, held)
-        ends = [end for k, end in enumerate(self._ends[carry.name]) if k not in failed]
-        goals = [at @ end @ tool.inverse() for end in ends or self._ends[carry.name]]
+        ends = [end for k, end in enumerate(self._ends[carry.name]) if k not in failed] or self._ends[carry.name]
+        goals = [at @ end @ tool.inverse() for end in ends]
         path = self.paths[carry.name] if carry.by_hand else self.paths[carry.name].with_tool(held.inverse())
         shown, leaving = ending(path, tail), path if lift else None
         motion = self._motion(carry, shown, goals, held=held, leaving=leaving)
@@ -251,8 +251,8 @@ class SkillMotions:
     ) -> MotionChoice:
         """Return a motion in two parts if only the second one may be in contact; the first one is free."""
         if phase.round:
-            motion = motion._replace(enough=Enough(MARGIN, as_shown=phase.kind == "carry"), searched=SEARCHED)
-            motion = motion._replace(blindly=phase.kind == "carry")
+            carried = phase.kind == "carry"
+            motion = motion._replace(enough=Enough(MARGIN, as_shown=carried), searched=SEARCHED, blindly=carried)
         if phase.before is None and math.isinf(phase.touch_within):
             return motion._replace(then=then)
         begun = ended = None
@@ -295,7 +295,7 @@ class SkillMotions:
         )
 
     def _imitated(self, phase: Phase, path: PosePath, goal: Pose) -> PosePath:
-        return level_imitation(path, goal) if phase.exact else imitated_path(path, goal)
+        return (level_imitation if phase.exact else imitated_path)(path, goal)
 
     def _near(self, phase: Phase, path: PosePath, body: Body) -> int:
         """Return the index of the pose from which hand and held object stay near the reference of a phase."""
@@ -319,12 +319,11 @@ class SkillMotions:
         body, around = executor.empty, executor.world_model.obstacles_if_holding(executor.observation, index)
         if held is not None and index is not None:
             body = executor.body_with(self.task.objects[index].parts, held)
-        names = {each.name for each in around}
-        wanted = dict.fromkeys((*self.task.touching, *self.contacts(phase, brushed=brushed)))
-        allowed = tuple(pair for pair in wanted if pair[0] in body.names and pair[1] in names)
-        reaches, keeping = self._postures.reach if len(goals) > FEW and not phase.as_shown else None, phase.keeping
-        goals = tuple(goals)
-        return MotionChoice(phase.name, shown, goals, body, around, allowed, leaving, reaches=reaches, keeping=keeping)
+        names, wanted = {each.name for each in around}, (*self.task.touching, *self.contacts(phase, brushed=brushed))
+        allowed = tuple(pair for pair in dict.fromkeys(wanted) if pair[0] in body.names and pair[1] in names)
+        reaches = self._postures.reach if len(goals) > FEW and not phase.as_shown else None
+        motion = MotionChoice(phase.name, shown, tuple(goals), body, around, allowed, leaving)
+        return motion._replace(reaches=reaches, keeping=phase.keeping)
 
 
 def _up(height: float) -> Pose:
