@@ -169,7 +169,7 @@ def test_a_lifted_cube_is_a_success_while_it_is_lifted():
     lying = observation["object_pose"][0]
     for height in (0.0, 0.015, 0.025, 0.3):  # robosuite's limit is 4 cm above the table, half a cube more than this
         env.sim.put(0, moved(lying, z=height))
-        sight = env._look(shaped=True)
+        sight = env.declared.guest.judge.look(env.sim, shaped=True)
         assert sight.success == (height > 0.02) == (sight.shaped == 1.0)
         assert 0.0 <= sight.shaped <= 1.0
     env.reset(seed=0)
@@ -191,7 +191,7 @@ def test_stacked_cubes_are_a_success():
     env = made("Stack", reward="dense")
     b = env.reset(seed=0)[0]["object_pose"][1]
     _, info = env.reset(seed=0, options={"object_poses": [moved(b, z=0.0449), b]})
-    assert info["robosuite_success"] and env._look(shaped=True).shaped == 1.0
+    assert info["robosuite_success"] and env.declared.guest.judge.look(env.sim, shaped=True).shaped == 1.0
 
 
 def test_an_object_off_the_table_ends_the_episode():
