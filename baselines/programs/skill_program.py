@@ -55,7 +55,8 @@ class SkillProgram:
         """Yield the actions of all phases in order."""
         doing = {"reach": self._reach, "slide": self._slide, "articulate": self._push, "leave": self._leave}
         in_hand = self.skill.in_hand
-        yield self.executor.still()  # to begin takes a tick of its own
+        if not in_hand:  # else the first thing to do is to keep the hand closed
+            yield self.executor.still()  # to begin takes a tick of its own
         for step in steps_of(self.skill):
             if isinstance(step, Transfer):
                 yield from self._transfer(step, in_hand=in_hand)

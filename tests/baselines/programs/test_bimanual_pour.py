@@ -15,6 +15,7 @@ from onedemo.planner.geometry import dualquat as dq
 from onedemo.planner.geometry.pose import PosePath
 from onedemo.planner.imitation.demonstration_files import read_demonstration
 from onedemo.planner.imitation.tsia import GUIDE_START, guide_index
+from onedemo.planner.resumable import finished
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +77,13 @@ def test_what_stands_in_the_way_stops_both_hands(env, policy):
     hands = memory.executor
     hands.hold(held)
     choice = memory.program._choice(held, np.array(program.PLACES[0]), *_first())
-    assert hands.roll_out(choice.forth, program.SLOW).reason == ""
+    assert finished(hands.roll_out(choice.forth, program.SLOW)).reason == ""
     middle = choice.forth[0].positions[len(choice.forth[0]) // 3]
     observation = {key: value.copy() for key, value in hands.observation.items()}
     observation["obstacle_active"][0], observation["obstacle_shape"][0] = 1.0, 1.0
     observation["obstacle_size"][0], observation["obstacle_pose"][0] = 0.03, [*middle, 1, 0, 0, 0]
     hands.observation = observation
-    assert hands.roll_out(choice.forth, program.SLOW).reason == "blocked"
+    assert finished(hands.roll_out(choice.forth, program.SLOW)).reason == "blocked"
 
 
 def _first():

@@ -34,7 +34,8 @@ def begun(task="stack", method="screw", ticks=40, **options):
 
 @pytest.mark.parametrize("task", NAMES)
 def test_a_guarded_hold_stands_still_and_the_motion_goes_on_as_if_nothing_had_been(task):
-    (one, memory, seen), (other, undisturbed, _) = (begun(task) for _ in range(2))
+    # two hands settle and think for 41 ticks
+    (one, memory, seen), (other, undisturbed, _) = (begun(task, ticks=60) for _ in range(2))
     for _ in range(3):
         action = one.hold(seen, memory)
         rows = action.reshape(len(one.task.arms), -1)
