@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gymnasium as gym
+import numpy as np
 import pytest
 
 import onedemo.envs  # noqa: F401  (registers the ids)
 from onedemo.baselines.factory import make_policy
+from onedemo.baselines.programs.arm_executor import CLOSE
 from onedemo.bench.episodes.episode import run_episode
 from onedemo.bench.episodes.scenarios import Scenario
 from onedemo.bench.run.episode_jobs import made, policy_for
@@ -46,6 +48,15 @@ def test_the_method_does_it_nearly_always(task):
 def test_one_block_is_placed_at_any_rate_and_on_another_block(change):
     for record in played("place_one", (3, 4), change):
         assert record.success, record
+
+
+def test_what_is_in_the_hand_is_held_from_the_first_tick():
+    config = load_config(shipped_config("place_one"))
+    env = made(config)
+    action, _ = policy_for(env, config).predict(env.reset(seed=3)[0])
+    env.close()
+    assert action[-1] == CLOSE
+    np.testing.assert_allclose(action[:-1], 0.0, atol=1e-12)
 
 
 def test_a_block_that_waits_on_the_table_is_fetched_first():
