@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...planner import Pose
 from ...planner.geometry import screw
-from ...planner.geometry.pose import Pose
 from ..judge.dense_reward import closeness
 from ..judge.goal_progress import contacts
 from ..judge.judge import unwanted_contacts
