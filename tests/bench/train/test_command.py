@@ -192,7 +192,7 @@ def test_a_damaged_state_is_named_with_what_helps(file, tmp_path):
         ("task=juggle", "task: unknown task 'juggle'; known: insert_one, place_one, reach"),
         ("task=stack", "task: unknown task 'stack'; known: insert_one, place_one, reach, tilt_pour"),
         ("env.reward=sparse", "env.reward: is chosen by the algorithm"),
-        ("env.colour=red", "env.colour: unknown key; allowed: control_mode"),
+        ("env.colour=red", "env.colour: unknown key; allowed: arm, control_mode"),
         ("learner.momentum=1", "learner.momentum: unknown key; allowed: action_noise, batch_size"),
         ("learner.envs=2", "learner.envs: unknown key; .*arguments of sac"),
         ("learner.hidden=128", "learner.hidden: input should be a valid list, got 128"),
